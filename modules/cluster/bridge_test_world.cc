@@ -35,7 +35,7 @@ std::string FreshJournal(const std::string& path) {
   return path;
 }
 
-// Some within the map, some with another.
+// Candidates alternate between kInter and kIntra.
 PlaceKind KindOf(int candidate) {
   return candidate % 2 == 0 ? PlaceKind::kInter : PlaceKind::kIntra;
 }

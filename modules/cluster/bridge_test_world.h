@@ -1,8 +1,8 @@
 #pragma once
 
-// A real nats-server on a loopback port, and round it a server and workers of the site hall in one
-// thread: the bridges are the real ones; agent_handler, place_recognition and the verifiers do as
-// little as their part of the bus asks.
+// For tests: a real nats-server on a loopback port, and a server and workers of the site "hall" on
+// one thread. The bridges are the real ones; agent_handler, place_recognition and the verifiers are
+// replaced by the least that their part on the bus needs.
 
 #include <gtest/gtest.h>
 
@@ -30,14 +30,14 @@ namespace pangea {
 
 inline constexpr int64_t kTestAckWait_us = 2'000'000;
 
-// Empty when it is not installed.
+// Path of nats-server; empty when it is not installed.
 std::string NatsServerProgram();
 
 int FreePort();
 
 class NatsServer {
  public:
-  // Without TLS and users, as whoever knows the port.
+  // A server without TLS and users.
   explicit NatsServer(const std::filesystem::path& store);
   const NatsAccess& access() const { return access_; }
   void Stop() { program_->End(SIGKILL); }
@@ -50,28 +50,29 @@ class NatsServer {
   std::unique_ptr<Program> program_;
 };
 
-// agent_handler and place_recognition: one agent's maps, a match a keyframe.
+// Stands for agent_handler and place_recognition: maps of one agent, and one match per keyframe.
 class TestServer {
  public:
-  // The journal is a new file there, no other test program's.
+  // The journal is a new file at this path, which no other test program may use.
   TestServer(const NatsAccess& access, const std::string& journal_path);
 
-  // Keyframes come from so many maps by turns; the matches of one rest on each other. At first one.
+  // Keyframes come from this many maps by turns (1 by default). Matches of the same map wait for
+  // each other.
   void set_num_maps(int num_maps) { num_maps_ = num_maps; }
-  // The next keyframe, and its match with this many candidates.
+  // Publishes the next keyframe and its match with this many candidates.
   void Add(int candidates);
   void SayHave();
-  // agent_handler asks for all results of this keyframe of the first map.
+  // As agent_handler, asks for all results of this keyframe of the first map.
   void AskForResults(int32_t seq);
-  // The bridge is killed, and begins anew with what the journal has.
+  // Kills the bridge, and starts it again with what the journal has.
   void RestartBridge(const std::string& site = "hall");
-  // Throws LeaseLost once another has the site.
+  // Throws LeaseLost if another core has the site.
   void Round(int64_t now_utime);
-  // Of the bus alone: what a bridge does that has not looked at its lease yet.
+  // Handles only the bus, as a bridge does before it checks its lease.
   void Drain() { bus_->Drain(); }
 
   const std::string& journal_path() const { return journal_path_; }
-  // All that the journal has may be acknowledged.
+  // Whether all that the journal has may be acknowledged.
   bool all_replicated() const { return replicated_bytes_ == journal_file_->size(); }
   const std::set<int64_t>& candidates() const { return candidates_; }
   // How often each result was published.
@@ -105,16 +106,16 @@ class TestServer {
   int num_again_ = 0;
 };
 
-// A verifier of one candidate a round beside a worker's bridge.
+// A worker's bridge and a verifier that verifies one candidate per round.
 class TestWorker {
  public:
   explicit TestWorker(const NatsAccess& access);
 
   void Round(int64_t now_utime);
-  // As kill -9 does: nothing more is heard of it.
+  // As kill -9: the worker does nothing more.
   void Kill() { killed_ = true; }
   void set_pauses(bool pauses) { pauses_ = pauses; }
-  // The next results do not reach the bridge.
+  // The next `count` results do not reach the bridge.
   void LoseResults(int count) { to_lose_ = count; }
   void AskForKeyframes(int32_t from_seq, int32_t to_seq);
 
@@ -123,7 +124,7 @@ class TestWorker {
   const std::set<KeyframeId>& keyframes() const { return keyframes_; }
   const std::vector<int32_t>& retransmitted() const { return retransmitted_; }
   const std::set<int64_t>& results_of_others() const { return results_of_others_; }
-  // How many results it knew when it took the match of this query.
+  // For each query, the number of results that it knew when it took the match.
   const std::map<KeyframeId, size_t>& known_at() const { return known_at_; }
 
  private:
@@ -145,10 +146,10 @@ class TestWorker {
   bool killed_ = false;
 };
 
-// A nats-server and the core of the site beside it; skipped where none is installed.
+// A nats-server and the core of a site. Tests are skipped if nats-server is not installed.
 class ClusterTest : public testing::Test {
  protected:
-  // `name`: of the files, no other test's.
+  // `name`: for the files; no other test may use it.
   explicit ClusterTest(const std::string& name) : files_(testing::TempDir() + "/cluster_" + name) {}
   void SetUp() override;
 

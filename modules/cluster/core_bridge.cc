@@ -43,7 +43,7 @@ CoreBridge::CoreBridge(Bus& bus, SiteStreams& streams, SiteLease& lease)
                                   std::bind_front(&CoreBridge::OnVerificationRequest, this));
 }
 
-// At once: agents wait for the acknowledgement.
+// Ships at once, because agents wait for the acknowledgement.
 void CoreBridge::OnJournalFile(const JournalFile& file) {
   shipper_.OnJournalFile(file);
   ShipJournal();
@@ -72,7 +72,7 @@ void CoreBridge::ToStore(SiteStreams::Entry entry) {
   to_store_.push_back(std::move(entry));
 }
 
-// A match whose results the journal has is no work for anybody.
+// A match whose results are all in the journal is not given to workers.
 bool CoreBridge::TakeMatch(const PlaceMatch& match) {
   const bool is_work = std::ranges::any_of(match.candidates, [&](const PlaceCandidate& candidate) {
     return !in_journal_.contains(ConstraintId(match.query, candidate));
@@ -116,7 +116,7 @@ void CoreBridge::StoreAll() {
   }
 }
 
-// Not while the journal is read: it would say that it has most of them.
+// Not while the journal is being read, because it may already have most of these results.
 void CoreBridge::PublishResults() {
   if (journal_.reading()) {
     return;

@@ -1,20 +1,20 @@
 #pragma once
 
-// The bridge beside a site's server, role core. The journal goes into the site's stream, event by
-// event (journal_shipper.h), and agent_handler is told how much of it is there: only then it
-// acknowledges. Place matches that lack results go to workers, and so do results of former runs.
-// The workers' results come back as CONSTRAINT, those that agent_handler asks for
-// (VERDICT_REQUEST) out of the stream, the options of their verifiers as OPTIONS_*. To
-// place_recognition, posegraph and the journal it is what inter_map_ba and fusion are.
+// The bridge beside a site's server, role core. It stores the journal in the site's stream, event
+// by event (journal_shipper.h), and tells agent_handler how much of it is there, so that it can
+// acknowledge that. Place matches that lack results, and results of former runs, go to the workers.
+// The workers' results come back as CONSTRAINT, and the options of their verifiers as OPTIONS_*.
+// Results that agent_handler asks for (VERDICT_REQUEST) are read from the stream. For
+// place_recognition, posegraph and the journal, the bridge replaces inter_map_ba and fusion.
 //   server bus: JOURNAL_FILE, HAVE, KEYFRAME_*, PLACE_MATCH, VERDICT_REQUEST, AGAIN_bridge in;
 //               JOURNAL_REPLICATED, CONSTRAINT, OPTIONS_*, AGAIN_agent_handler, RESEND_REQUEST,
 //               STATUS_bridge out
 //
-// It is there while it holds the site's lease; when another core has begun it ends by LeaseLost.
+// It runs while it holds the site's lease. When another core has begun, it throws LeaseLost.
 //
-// At a start the journal says which matches and results are to be stored. While NATS does not
-// answer these wait, at most kMaxUnstored messages; beyond that the process ends with an error, and
-// has it all again from the journal when it is started again. One thread.
+// At the start it learns from the journal which matches and results it has to store. While NATS
+// does not answer, at most kMaxUnstored messages wait; beyond that the process ends with an error,
+// and learns them from the journal again at its next start. Not thread safe.
 
 #include <cstdint>
 #include <deque>
@@ -34,7 +34,7 @@ namespace pangea {
 
 class CoreBridge : public Process {
  public:
-  // The lease is held. Throws LeaseLost, and std::runtime_error when NATS does not answer.
+  // `lease` must be held. Throws LeaseLost, or std::runtime_error when NATS does not answer.
   CoreBridge(Bus& bus, SiteStreams& streams, SiteLease& lease);
 
   void Tick(int64_t now_utime) override;
@@ -43,10 +43,10 @@ class CoreBridge : public Process {
 
  private:
   static constexpr size_t kMaxUnstored = 5000;
-  // In one go, so that messages on the bus do not wait long; more than a piece of the journal's
-  // file has.
+  // Messages handled at once, so that the bus does not wait for long. It is more than a piece of
+  // the journal's file has.
   static constexpr int kPiece = 500;
-  // By then agent_handler hears again of what is replicated.
+  // Interval at which agent_handler is told again what is replicated.
   static constexpr int64_t kToldInterval_us = 250'000;
 
   void OnJournalFile(const JournalFile& file);
@@ -71,7 +71,7 @@ class CoreBridge : public Process {
   std::set<int64_t> in_journal_;                      // constraint ids
   std::deque<std::pair<KeyframeId, int64_t>> asked_;  // query and constraint id
   int64_t now_utime_ = 0;
-  int64_t told_bytes_ = -1;  // of the journal, that are replicated
+  int64_t told_bytes_ = -1;  // replicated bytes of the journal, as last told
   int64_t next_told_utime_ = 0;
   int64_t next_poll_utime_ = 0;
   int64_t next_status_utime_ = 0;

@@ -1,10 +1,11 @@
 #pragma once
 
-// A standby's journal: a file that follows the site's stream. What it has already is compared with
-// the stream, event by event; where it has another event (this host was the core, and wrote what it
-// told nobody was kept), its end is cut off, kept beside it (log_file/damaged_copy.h), and the
-// stream's events take its place. A file that goes on where the stream ends stays as it is. One
-// that differs from its first event on is another site's and is refused. One thread.
+// A standby's journal: a file that follows the site's stream. Events that it already has are
+// compared with the stream, one by one. If one differs (this host was the core, and wrote events
+// that were never acknowledged), the file from there on is copied to a file beside it
+// (log_file/damaged_copy.h) and replaced by the stream's events. A file that continues after the
+// end of the stream stays as it is. A file whose first event differs is another site's, and is
+// refused. Not thread safe.
 
 #include <cstdint>
 #include <filesystem>
@@ -20,23 +21,24 @@ namespace pangea {
 
 class JournalCopy {
  public:
-  // Throws std::runtime_error, as all the others, when the file cannot be read or written.
+  // This and all other functions throw std::runtime_error when the file cannot be read or written.
   JournalCopy(std::filesystem::path journal, SiteStreams& streams);
   ~JournalCopy();
   JournalCopy(const JournalCopy&) = delete;
   JournalCopy& operator=(const JournalCopy&) = delete;
 
-  // Some of what is new in the stream; on the disk when this returns. Whether there may be more.
+  // Copies some new events of the stream; they are on the disk when this returns. Returns whether
+  // there may be more.
   bool Follow();
-  // Up to where the file is the stream's.
+  // Up to where the file and the stream are equal.
   JournalCursor cursor() const;
-  // For people; what was cut off, if anything was.
+  // For people: the file with the events that were cut off; empty if none were.
   const std::string& cut() const { return cut_; }
 
  private:
   static constexpr int kPiece = 500;
 
-  // The file's next event is this one. False: it has another. Nothing: it has none.
+  // Whether the file's next event is this one. Nothing if the file has no next event.
   std::optional<bool> HasNext(const SiteStreams::JournalEvent& event);
   void Cut();
   void Append(const SiteStreams::JournalEvent& event);
@@ -44,9 +46,9 @@ class JournalCopy {
   const std::filesystem::path path_;
   SiteStreams& streams_;
   int fd_ = -1;
-  std::optional<LogScan> scan_;       // of what is still to be compared
-  JournalCursor at_;                  // so much was
-  std::unique_ptr<Journal> journal_;  // once it is written to
+  std::optional<LogScan> scan_;       // the part of the file that is still to be compared
+  JournalCursor at_;                  // the part that was compared
+  std::unique_ptr<Journal> journal_;  // set when the first event is appended
   std::string cut_;
 };
 

@@ -20,13 +20,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// While another still writes, or NATS chooses who decides there.
+// Storing the term is tried again while another core still writes, or NATS elects a leader.
 constexpr int kTries = 100;
 constexpr std::chrono::milliseconds kBetweenTries{100};
 
 fs::path CursorFile(const fs::path& journal) { return journal.string() + ".stream"; }
 
-// Closed when it goes.
+// A file that is closed by the destructor.
 struct OpenJournal {
   explicit OpenJournal(const std::string& path) : fd(open(path.c_str(), O_RDONLY | O_CLOEXEC)) {}
   ~OpenJournal() { close(fd); }
@@ -135,13 +135,14 @@ bool JournalShipper::ShipEvent(const LogPiece& event) {
       case SiteStreams::Stored::kOtherwise:
         end_ = streams_.JournalEnd().value_or(0);
         if (end_ <= sequence_) {
-          return false;  // who answered does not know of it yet
+          return false;  // the node of NATS that answered does not know the newest event yet
         }
     }
   }
 }
 
-// A term is stored only by who has all before it in its file.
+// Called when no event of the file is left: before our term the stream may only have further terms,
+// because a core stores its term only when its file has all earlier events.
 void JournalShipper::PassTerms() {
   std::optional<SiteStreams::JournalEvent> next;
   end_ = std::max(end_, begin_);
@@ -153,7 +154,7 @@ void JournalShipper::PassTerms() {
 
 void JournalShipper::Ship() {
   if (shipped_.path.empty()) {
-    return;  // nobody has said which
+    return;  // the file is not known yet
   }
   JournalState& at = shipped_.state;
   if (at.num_bytes >= wanted_bytes_) {

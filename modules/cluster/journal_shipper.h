@@ -1,12 +1,12 @@
 #pragma once
 
-// A core's journal into the site's stream, event by event in the file's order, each stored only if
-// the stream's newest is the one stored before it. A core begins by storing its term there
-// (site_lease.h): from then on whoever had the lease before can store nothing, whatever it
-// believes. So the stream has one writer at a time, and is what the site has: the file is a copy of
-// it, and may be ahead of it by what nobody was told is kept.
+// Stores a core's journal in the site's stream, event by event in the file's order. An event is
+// stored only if the stream's newest event is the one stored before it. A core begins by storing
+// its term in the stream (site_lease.h); from then on, a former core cannot store anything, even if
+// it believes to have the lease. So the stream has one writer at a time, and is the site's true
+// journal. The file is a copy of it, which may be ahead by events that were not acknowledged.
 //
-// Events of the file's own (CHECKSUMS, DAMAGED) do not go. One thread.
+// Events that belong to the file itself (CHECKSUMS, DAMAGED) are not stored. Not thread safe.
 
 #include <cstdint>
 #include <filesystem>
@@ -20,14 +20,14 @@
 
 namespace pangea {
 
-// Up to where a file's events are the stream's.
+// A position up to which a file and the stream have the same events.
 struct JournalCursor {
   JournalState file;
-  uint64_t sequence = 0;  // in the stream
-  uint64_t term = 0;      // that is there; 0: an event is
+  uint64_t sequence = 0;  // the position in the stream
+  uint64_t term = 0;      // the term stored at this sequence; 0: it is an event
 
-  // "<journal>.stream", which says it for the next start. One that is not there, of another journal
-  // or of another stream is the beginning.
+  // The cursor in the file "<journal>.stream", for the next start. If it is missing, or is of
+  // another journal or stream, Read returns the beginning.
   static JournalCursor Read(const std::filesystem::path& journal, SiteStreams& streams);
   void Write(const std::filesystem::path& journal) const;
 };
@@ -37,26 +37,27 @@ struct LeaseLost : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-// Stores it behind all that is in the stream; its sequence there. Throws std::runtime_error when
-// NATS does not answer.
+// Stores the term at the end of the stream and returns its sequence. Throws std::runtime_error when
+// NATS does not take it.
 uint64_t StoreTerm(SiteStreams& streams, uint64_t term);
 
-// Whether it is of the file and not of the journal.
+// Whether the piece belongs to the file itself and is not an event of the journal.
 bool IsOfFile(const LogPiece& piece);
 
 class JournalShipper {
  public:
-  // `term` is in the stream, at `begin`.
+  // `term` is stored in the stream, with the sequence `begin`.
   JournalShipper(SiteStreams& streams, uint64_t term, uint64_t begin)
       : streams_(streams), term_(term), begin_(begin) {}
 
-  // So much is on the disk; the first call says which file.
+  // Which file the journal is, and how much of it is on the disk.
   void OnJournalFile(const JournalFile& file);
-  // The next events. Throws LeaseLost, and std::runtime_error when the stream has others.
+  // Stores the next events. Throws LeaseLost, or std::runtime_error when the stream has other
+  // events.
   void Ship();
 
-  // So much of the file is in the stream; nothing: it is not known whether the file has all that
-  // was there before the term.
+  // How much of the file is in the stream. Nothing while it is not known whether the file has all
+  // events that were in the stream before the term.
   std::optional<JournalFile> shipped() const {
     return sequence_ >= begin_ && !shipped_.path.empty() ? std::optional(shipped_) : std::nullopt;
   }
@@ -67,9 +68,10 @@ class JournalShipper {
   static constexpr int64_t kPieceBytes = 1'000'000;
 
   void PassTerms();
-  // Whether it is in the stream now.
+  // Returns whether the event is in the stream now.
   bool ShipEvent(const LogPiece& event);
-  // The stream's next event, past terms; false: it is not known.
+  // Finds the stream's next event and skips terms; no event: the end of the stream. False if NATS
+  // does not answer.
   bool FindNext(std::optional<SiteStreams::JournalEvent>* event);
 
   SiteStreams& streams_;
@@ -77,8 +79,8 @@ class JournalShipper {
   const uint64_t begin_;
   JournalFile shipped_;
   int64_t wanted_bytes_ = 0;
-  uint64_t sequence_ = 0;  // of the newest that the file has too
-  uint64_t end_ = 0;       // of the stream, as far as is known
+  uint64_t sequence_ = 0;  // of the newest message that the file has too
+  uint64_t end_ = 0;       // newest known sequence of the stream
   int64_t num_too_large_ = 0;
 };
 

@@ -1,4 +1,4 @@
-// pangea-bridge: a site on more than one host, over NATS.
+// pangea-bridge: connects the hosts of a site that has more than one, over NATS.
 
 #include <fmt/format.h>
 

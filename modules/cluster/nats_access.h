@@ -1,6 +1,6 @@
 #pragma once
 
-// How NATS is reached: where, whom to trust there, and as whom.
+// How to connect to NATS: the address, the trusted authority, and the user.
 
 #include <filesystem>
 #include <string>
@@ -11,14 +11,15 @@ namespace pangea {
 
 struct NatsAccess {
   std::string url =
-      "nats://127.0.0.1:4222";  // several, of one cluster of NATS: with commas between
-  std::filesystem::path ca;     // whose certificate the server's has to be signed by; for tls://
-  std::filesystem::path credentials;  // "user: NAME" and "password: WORD"; mode 0600; empty: nobody
+      "nats://127.0.0.1:4222";  // or several nodes of one NATS cluster, separated by commas
+  std::filesystem::path ca;     // certificate of the authority that signed the server's; for tls://
+  std::filesystem::path credentials;  // "user: NAME" and "password: WORD"; mode 0600; empty: none
 
   std::vector<std::string> Urls() const;
   bool tls() const;
-  // Throws std::runtime_error, one line with the mend, when this is not to be tried: a password
-  // over plain text, tls:// without an authority, a file of credentials that others can read.
+  // Throws std::runtime_error, one line with advice, for settings that are not safe: a password
+  // over an unencrypted connection, tls:// without an authority, or credentials that others can
+  // read.
   void Check() const;
 };
 

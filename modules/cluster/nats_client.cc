@@ -14,13 +14,13 @@ namespace pangea {
 namespace {
 
 constexpr int64_t kReconnectWait_ms = 500;
-constexpr int64_t kPing_ms = 2000;  // a host that is gone says nothing
+constexpr int64_t kPing_ms = 2000;  // to notice that a host is gone
 constexpr int64_t kNanosecondsPerMicrosecond = 1000;
 constexpr int64_t kMaxUnacknowledged = 100'000;  // NATS' own default would stop a large cluster
 constexpr char kUtimeHeader[] = "Pangea-Utime";
 constexpr char kExpectedOfStream[] = "Nats-Expected-Last-Sequence";
 constexpr char kExpectedOfSubject[] = "Nats-Expected-Last-Subject-Sequence";
-// A cluster of NATS that was just started chooses who decides.
+// How long a NATS cluster that was just started may take to elect its leader.
 constexpr std::chrono::seconds kLongestChoice{20};
 
 struct Deleter {
@@ -41,7 +41,7 @@ std::vector<uint8_t> DataOf(const natsMsg* message) {
   return {data, data + natsMsg_GetDataLength(message)};
 }
 
-// JetStream's answer when it has nothing: no message, but a status.
+// Whether this is a status and not a message: JetStream's answer when it has no message.
 bool IsStatus(natsMsg* message) {
   const char* status = nullptr;
   return natsMsgHeader_Get(message, "Status", &status) == NATS_OK;
@@ -54,7 +54,7 @@ int64_t UtimeOf(natsMsg* message) {
 
 std::string WhyNotConnected(natsStatus status, const NatsAccess& access) {
   const std::string& url = access.url;
-  // libnats tries TLS by itself then, and trusts nobody.
+  // If the server requires TLS, libnats tries it by itself, without a trusted authority.
   if (!access.tls() && (status == NATS_SSL_ERROR || status == NATS_SECURE_CONNECTION_REQUIRED)) {
     return fmt::format("NATS at {} takes TLS only: give --nats tls://HOST:4222 and --ca FILE", url);
   }
@@ -83,13 +83,13 @@ std::string WhyNotConnected(natsStatus status, const NatsAccess& access) {
   }
 }
 
-// Who decides is being chosen, or no node of those that are needed is there yet.
+// Whether the error may be temporary: a leader is being elected, or needed nodes are not there yet.
 bool MayChange(natsStatus status, jsErrCode error) {
   return status == NATS_TIMEOUT || error == JSClusterNotAvailErr || error == JSClusterNoPeersErr ||
          error == JSInsufficientResourcesErr;
 }
 
-// The subject of acks has when its message was stored, in nanoseconds:
+// The ack subject of a message contains the time when it was stored, in nanoseconds:
 // $JS.ACK[.domain.account].stream.consumer.deliveries.sequence.sequence.when.pending[.token].
 int64_t StoredUtime(const std::string& ack_subject) {
   constexpr size_t kWhen = 7, kWhenBehindDomain = 9, kWithDomain = 11;
@@ -139,7 +139,7 @@ struct NatsClient::Impl {
     Check(status, error, what);
   }
 
-  // The options of a connection.
+  // Sets the options of the connection.
   void SetOptions(const NatsAccess& access, const std::string& name) {
     natsOptions* made = nullptr;
     natsOptions_Create(&made);
@@ -167,7 +167,7 @@ struct NatsClient::Impl {
     if (!access.credentials.empty()) {
       const NatsCredentials credentials = ReadCredentials(access.credentials);
       natsOptions_SetUserInfo(made, credentials.user.c_str(), credentials.password.c_str());
-      // Nobody else may read its answers.
+      // A prefix for each user, so that other users cannot read the answers.
       natsOptions_SetCustomInboxPrefix(made, ("_INBOX." + credentials.user).c_str());
     }
   }
@@ -268,7 +268,7 @@ NatsClient::StoreAnswer NatsClient::Store(const std::string& subject, Bytes data
   if (utime != 0) {
     natsMsgHeader_Set(made, kUtimeHeader, std::to_string(utime).c_str());
   }
-  // libnats' own options say nothing of a stream that is to be empty.
+  // We set the headers ourselves, because libnats' options cannot require that there is no message.
   const bool of_stream = condition.what == If::What::kNewestOfStream;
   natsMsgHeader_Set(made, of_stream ? kExpectedOfStream : kExpectedOfSubject,
                     std::to_string(condition.sequence).c_str());
@@ -339,8 +339,8 @@ std::optional<std::vector<std::string>> NatsClient::Subjects(const std::string& 
   return found;
 }
 
-// libnats' own fetch leaves its request with NATS when it has waited in vain, and what answers that
-// is nobody's until it is delivered again. This one is answered at once.
+// If libnats' own fetch times out, its request stays with NATS; a message sent to it later would be
+// lost until it is delivered again. This request is answered at once.
 std::optional<NatsClient::Delivery> NatsClient::Fetch(const std::string& stream,
                                                       const std::string& consumer) {
   if (!connected()) {

@@ -8,7 +8,8 @@
 namespace pangea {
 namespace {
 
-// Verifying a match takes tenths of a second; what is asked for twice is only said twice.
+// Verifying a match takes tenths of a second. Asking too early does no harm: the verifier only
+// repeats its result.
 constexpr int64_t kFirstAsk_us = 3'000'000;
 constexpr int64_t kMaxAsk_us = 60'000'000;
 

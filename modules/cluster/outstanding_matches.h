@@ -1,8 +1,8 @@
 #pragma once
 
-// The place matches that a worker has taken from the queue, and which verification results each of
-// them still lacks. A match is done when the results of all its candidates are stored, whoever made
-// them. No bus, no NATS, no clock: time goes in (microseconds).
+// The place matches that a worker has taken from the queue, and the verification results that each
+// of them still lacks. A match is done when the results of all its candidates are stored, no matter
+// which worker made them. No bus, no NATS, no clock: microseconds go in.
 
 #include <cstdint>
 #include <map>
@@ -16,33 +16,33 @@ namespace pangea {
 
 class OutstandingMatches {
  public:
-  // A match of which at least one candidate lacks its result; candidates that have one are left
-  // out of it. `ack_subject` is where the queue is told of it. The same match again: the newer
-  // one counts.
+  // `match` has only the candidates without a result, at least one. `ack_subject`: for the queue.
+  // If the match was added before, the new one replaces it.
   void Add(PlaceMatch match, std::string ack_subject, int64_t now_us);
 
-  // A result is stored. Its match's ack_subject if that lacks nothing any more; then it is
-  // forgotten.
+  // A result was stored. If its match now has all results, returns the match's ack_subject and
+  // forgets the match.
   std::optional<std::string> NoteStored(int64_t constraint_id);
 
-  // Matches whose results are overdue, with the candidates that lack one; each ever more rarely.
+  // The matches whose results are overdue, with the candidates that lack one. The interval at which
+  // a match is returned again doubles.
   std::vector<PlaceMatch> Overdue(int64_t now_us);
 
   bool Lacks(int64_t constraint_id) const { return lacking_.contains(constraint_id); }
   std::vector<std::string> AckSubjects() const;
   size_t size() const { return matches_.size(); }
-  // Results.
+  // Number of missing results.
   size_t num_lacking() const { return lacking_.size(); }
 
  private:
   struct Outstanding {
-    PlaceMatch match;  // with the candidates that lack their result
+    PlaceMatch match;  // with the candidates that lack a result
     std::string ack_subject;
     int64_t next_ask_us = 0;
     int64_t wait_us = 0;
   };
   std::map<KeyframeId, Outstanding> matches_;
-  std::map<int64_t, KeyframeId> lacking_;  // constraint id to the match's query
+  std::map<int64_t, KeyframeId> lacking_;  // id of a missing result -> query of its match
 };
 
 }  // namespace pangea

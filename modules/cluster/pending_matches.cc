@@ -10,7 +10,7 @@
 namespace pangea {
 namespace {
 
-// A match is 30 kB.
+// Not more often, because reading a match from NATS transfers 30 kB.
 constexpr int64_t kLookInterval_us = 1'000'000;
 
 }  // namespace

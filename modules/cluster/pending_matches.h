@@ -1,7 +1,7 @@
 #pragma once
 
-// Which of the queue's matches others still have to wait for (core/candidates/candidate_order.h).
-// One thread.
+// Decides whether a match must wait for other matches in the queue
+// (core/candidates/candidate_order.h). Not thread safe.
 
 #include <cstdint>
 #include <optional>
@@ -17,18 +17,19 @@ class PendingMatches {
  public:
   explicit PendingMatches(SiteStreams& streams) : streams_(streams) {}
 
-  // Whether no candidate of the match rests on one that lacks its result. False also when NATS does
-  // not answer.
+  // True if no candidate of the match has to wait for a candidate without a result. False also when
+  // NATS does not answer.
   bool LetPass(const PlaceMatch& match, int64_t now_utime);
 
  private:
-  // Of each map's pending queries the first. Nothing: NATS does not answer.
+  // The first pending query of each map. Nothing if NATS does not answer.
   std::optional<std::vector<KeyframeId>> FirstOf(const std::set<MapId>& maps);
   bool HasAllResults(const KeyframeId& query);
   void LookForFinished(const std::vector<KeyframeId>& queries);
 
   SiteStreams& streams_;
-  // An acknowledged match stays in the stream for ever if NATS was killed before it forgot it.
+  // Queries with all results whose match is still in the stream: if NATS is killed at the wrong
+  // moment, an acknowledged match stays there for ever.
   std::set<KeyframeId> finished_;
   int64_t next_look_utime_ = 0;
 };

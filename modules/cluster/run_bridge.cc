@@ -29,7 +29,8 @@ std::string DrawnHolder() {
   return fmt::format("{}:{:08x}", host.data(), std::random_device{}());
 }
 
-// Until it holds or a signal comes; whether it holds. What is said changes is logged.
+// Waits until `holds` is true or a signal comes; returns whether it is true. Logs `said` when it
+// changes.
 bool Wait(const std::function<bool()>& holds, const std::function<std::string()>& said) {
   InstallSignalHandlers();
   StateChanges changes;

@@ -1,6 +1,6 @@
 #pragma once
 
-// pangea-bridge in each of its roles.
+// Runs pangea-bridge in one of its roles.
 
 #include <filesystem>
 #include <string>
@@ -15,14 +15,14 @@ struct BridgeArguments {
   std::string site;
   std::string bus = kDefaultBusUrl;
   NatsAccess nats;
-  int replicas = 0;               // of the streams; 0: as they are
-  size_t max_matches = 4;         // a worker's at a time
-  std::filesystem::path journal;  // a standby's
-  std::string holder;             // of the lease; empty: a name is drawn, and a core waits for it
+  int replicas = 0;               // of the streams; 0: keep the number
+  size_t max_matches = 4;         // that a worker takes at a time
+  std::filesystem::path journal;  // of a standby
+  std::string holder;             // of the lease; empty: a random name; a core waits for the lease
 };
 
-// Until a signal, and of a standby until this host is the site's core. The exit code. Throws
-// std::runtime_error.
+// Runs until a signal; a standby also ends when this host has become the site's core. Returns the
+// exit code. Throws std::runtime_error.
 int RunBridge(BridgeArguments arguments);
 
 }  // namespace pangea

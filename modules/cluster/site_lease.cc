@@ -43,7 +43,7 @@ bool SiteLease::Renew(int64_t now_utime) {
   if (now_utime - renewed_utime_ < kRenew_us || Write(holder_, sequence_, now_utime)) {
     return true;
   }
-  // It was written and NATS' answer got lost, or it is another's.
+  // Either our record was written and NATS' answer was lost, or another host has the lease.
   const auto newest = streams_.LeaseSequence();
   if (!newest || *newest == sequence_) {
     return true;

@@ -1,14 +1,15 @@
 #pragma once
 
-// Who the core of a site is: a record in NATS with its holder's name, which the holder writes anew
-// again and again, each time only if it is still the newest (compare and set by sequence). One that
-// has not moved for kHeld_us, as seen from here, is free to be taken; so no two hosts' clocks are
-// compared. While NATS does not answer nobody takes it, and the time starts anew: then its holder
-// cannot have written either.
+// The lease that says which host is the core of a site. It is a record in NATS with the holder's
+// name. The holder renews it by writing it again and again, each time only if its own record is
+// still the newest (compare and set by sequence). If this host has seen no new record for kHeld_us,
+// the lease is free; so clocks of two hosts are never compared. While NATS does not answer, nobody
+// takes the lease, and the time starts again, because the holder could not renew it either.
 //
-// The sequence with which it was taken is the holder's term. Whoever is cut off or asleep for
-// longer does not know that another has it: so the lease alone keeps nobody from writing. The terms
-// in the site's journal do (journal_shipper.h). Clock: WallUtime, which never steps. One thread.
+// The sequence of the record that took the lease is the holder's term. A host that was cut off or
+// suspended does not know that another one has the lease, so the lease alone does not prevent it
+// from writing. The terms in the site's journal do (journal_shipper.h). The clock is WallUtime,
+// which never steps. Not thread safe.
 
 #include <cstdint>
 #include <optional>
@@ -22,23 +23,24 @@ class SiteLease {
  public:
   static constexpr int64_t kHeld_us = 4'000'000;
   static constexpr int64_t kRenew_us = 500'000;
-  // What relies on the lease stops when it was not written for so long, well before it is free.
+  // When the lease was not renewed for this time, the core stops what relies on it, well before the
+  // lease is free.
   static constexpr int64_t kFresh_us = 2'000'000;
 
-  // `holder`: a name that nobody else has, without blanks.
+  // `holder`: a unique name without blanks.
   SiteLease(SiteStreams& streams, std::string holder);
 
-  // At about 10 Hz until it is ours; whether it is.
+  // Call it at about 10 Hz until it returns true: then we hold the lease.
   bool TryAcquire(int64_t now_utime);
-  // At about 10 Hz while it is ours; false once another has it.
+  // Call it at about 10 Hz while we hold the lease. False if another host has it.
   bool Renew(int64_t now_utime);
-  // Another need not wait.
+  // Gives the lease up, so that another host need not wait.
   void Release();
 
-  // With which it was taken.
+  // The term with which the lease was taken.
   uint64_t term() const { return term_; }
   bool fresh(int64_t now_utime) const { return now_utime - renewed_utime_ < kFresh_us; }
-  // Who has it, as far as is known; for people.
+  // For people: the last known holder.
   const std::string& seen_holder() const { return seen_holder_; }
 
  private:
@@ -47,11 +49,11 @@ class SiteLease {
   SiteStreams& streams_;
   const std::string holder_;
   uint64_t term_ = 0;
-  uint64_t sequence_ = 0;  // of our newest record, while it is ours
+  uint64_t sequence_ = 0;  // of our newest record, while we hold the lease
   int64_t renewed_utime_ = 0;
-  std::optional<uint64_t> seen_;  // the newest record, while it is not
+  std::optional<uint64_t> seen_;  // sequence of the newest record, while another holds it
   std::string seen_holder_;
-  int64_t seen_utime_ = 0;  // since when
+  int64_t seen_utime_ = 0;  // when this record was first seen
 };
 
 }  // namespace pangea

@@ -18,11 +18,11 @@ constexpr char kJournal[] = "journal";
 constexpr char kMatch[] = "match";
 constexpr char kResult[] = "result";
 constexpr char kLease[] = "lease";
-constexpr char kTerm[] = "term";  // in place of a channel; those have capitals
+constexpr char kTerm[] = "term";  // used like a channel; real channels have capital letters
 constexpr char kWorkers[] = "workers";
 constexpr size_t kMaxSiteName = 40;
 
-// It becomes part of subjects and of names of streams.
+// The site's name must be valid, because it becomes a part of subjects and stream names.
 std::string CheckedSite(const std::string& site) {
   const bool good = !site.empty() && site.size() <= kMaxSiteName &&
                     std::ranges::all_of(site, [](unsigned char c) {
@@ -35,7 +35,7 @@ std::string CheckedSite(const std::string& site) {
   return site;
 }
 
-// Behind "journal.": its channel, and what makes the subject the keyframe's.
+// The end of a keyframe's subject, after "journal.": the channel, opened_utime and seq.
 std::string KeyframeTokens(const KeyframeId& id) {
   return fmt::format("{}.{}.{}", channels::Keyframe(id.map.agent_id), id.map.opened_utime, id.seq);
 }

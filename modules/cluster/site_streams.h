@@ -1,19 +1,19 @@
 #pragma once
 
-// A site's streams in NATS: its journal, place matches that wait for a worker, results of workers,
-// and who its core is.
+// A site's streams in NATS: its journal, the place matches that wait for a worker, the results of
+// workers, and the lease that says which host is the core.
 //   stream pangea-<site>-journal, subject pangea.<site>.journal.<channel>, of keyframes
 //                                         pangea.<site>.journal.<channel>.<opened_utime>.<seq>
 //   stream pangea-<site>-match,   subject pangea.<site>.match.<agent>.<opened_utime>.<seq>
 //   stream pangea-<site>-result,  subject pangea.<site>.result.<agent>.<opened_utime>.<seq>.<id>
 //   stream pangea-<site>-lease,   subject pangea.<site>.lease: the newest record counts
-//   subject pangea.<site>.have: the newest HAVE, to who listens
+//   subject pangea.<site>.have: the newest HAVE, only for clients that listen now
 //   subject pangea.<site>.options.<process>: OPTIONS_<process> of workers
-// The journal has all events of the site's journal, in its order: it is written by one core at a
-// time (journal_shipper.h). The map and seq of matches and results are the query's; <id> is the
-// constraint's. The bytes are LCM's. A subject of matches and results has one message: what is
-// stored again is not stored twice, however much later. A match goes when it is acknowledged. One
-// thread.
+// The journal's stream has all events of the site's journal in its order; one core at a time writes
+// it (journal_shipper.h). Matches and results have the map and seq of the query, and <id> is the
+// constraint's id. The data are LCM messages. A subject of a match or result has one message:
+// storing it again has no effect, however much later. A match is removed when it is acknowledged.
+// Not thread safe.
 
 #include <cstdint>
 #include <optional>
@@ -29,17 +29,17 @@ namespace pangea {
 
 class SiteStreams {
  public:
-  // A worker that is silent for so long has lost its matches to others.
+  // If a worker is silent for this time, other workers get its matches.
   static constexpr int64_t kAckWait_us = 5'000'000;
 
   // Connects. Throws std::runtime_error.
   SiteStreams(const NatsAccess& access, const std::string& site);
 
   bool connected() const { return nats_.connected(); }
-  // Those that are not there; a core's to do. `replicas` 0: as they are, or 1. Throws
-  // std::runtime_error.
+  // Makes the streams that do not exist; only a core does this. `replicas` 0: keep the number; 1
+  // for new streams. Throws std::runtime_error.
   void Make(int replicas = 0, int64_t ack_wait_us = kAckWait_us);
-  // Whether a core has.
+  // Whether a core has made the streams.
   bool AreThere() { return nats_.LastSequence(Stream("result")).has_value(); }
 
   struct Entry {
@@ -51,13 +51,13 @@ class SiteStreams {
   using Stored = NatsClient::Stored;
   Stored Store(const Entry& entry) { return nats_.Store(entry.subject, entry.data, {}).stored; }
 
-  // The site's journal. An event is stored behind the one with this sequence, if that is the
-  // newest; a term (site_lease.h) is told in it as an event of its own.
+  // The site's journal. An event is stored only if the newest one has the sequence `behind`. A term
+  // (site_lease.h) is stored as an event of its own.
   using StoreAnswer = NatsClient::StoreAnswer;
   StoreAnswer StoreEvent(const std::string& channel, int64_t utime, Bytes data, uint64_t behind);
   StoreAnswer StoreTerm(uint64_t term, uint64_t behind);
   struct JournalEvent {
-    uint64_t term = 0;  // of a core that began here; then nothing else is in it
+    uint64_t term = 0;  // not 0: a core began here, and this is not an event of the journal
     std::string channel;
     int64_t utime = 0;
     std::vector<uint8_t> data;
@@ -66,23 +66,23 @@ class SiteStreams {
   std::optional<uint64_t> JournalEnd() { return nats_.LastSequence(Stream("journal")); }
   std::optional<uint64_t> ResultsEnd() { return nats_.LastSequence(Stream("result")); }
 
-  // Who the core is: the newest record, and the sequence that the next one is put behind.
+  // The lease: its newest record, and the sequence of that.
   std::optional<uint64_t> LeaseSequence() { return nats_.LastSequence(Stream("lease")); }
   std::optional<std::string> FindLease();
   StoreAnswer StoreLease(const std::string& record, uint64_t behind);
 
-  // Nothing: it is not there, or NATS does not answer.
+  // Nothing if the message is not there, or NATS does not answer.
   using Message = NatsClient::Message;
   std::optional<Message> FindKeyframe(const KeyframeId& id);
   std::optional<Message> FindMatch(const KeyframeId& query);
   std::optional<Message> FindResult(const KeyframeId& query, int64_t constraint_id);
 
-  // Follows a stream, or a part of it, from its beginning.
+  // Reads a stream, or a part of its subjects, from the beginning.
   class Reader {
    public:
-    // Nothing: no more is there now, or NATS does not answer.
+    // The next message. Nothing if there is none now, or NATS does not answer.
     std::optional<Message> Next();
-    // Whether it has had the stream's message of this sequence.
+    // Whether the reader is past the stream's message with this sequence.
     bool HasHad(uint64_t sequence) const { return next_ > sequence; }
 
    private:
@@ -98,7 +98,7 @@ class SiteStreams {
   Reader Results();
   Reader ResultsOf(const MapId& map);
 
-  // Of the queue of matches (nats_client.h).
+  // The queue of matches (nats_client.h).
   using Delivery = NatsClient::Delivery;
   using QueueState = NatsClient::QueueState;
   std::optional<Delivery> FetchMatch();
@@ -107,8 +107,8 @@ class SiteStreams {
   void Nak(const std::string& ack_subject, int64_t delay_us = 0) {
     nats_.Nak(ack_subject, delay_us);
   }
-  // Queries of this map whose match is in the queue, or taken and not acknowledged. Nothing: NATS
-  // does not answer.
+  // The queries of this map whose match is in the queue, or taken and not acknowledged. Nothing if
+  // NATS does not answer.
   std::optional<std::vector<KeyframeId>> PendingMatchesOf(const MapId& map);
   std::optional<QueueState> MatchQueueState();
 

@@ -8,7 +8,7 @@ Standby::Standby(const std::filesystem::path& journal, SiteStreams& streams,
                  const std::string& holder)
     : journal_(journal), streams_(streams), lease_(streams, holder), copy_(journal, streams) {}
 
-// Before the term is stored the former core may still write.
+// The journal is followed again after the term is stored: until then the former core may write.
 bool Standby::Step(int64_t now_utime) {
   const bool more = copy_.Follow();
   if (begin_ == 0 && !more && lease_.TryAcquire(now_utime)) {

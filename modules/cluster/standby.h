@@ -1,8 +1,8 @@
 #pragma once
 
-// A host that may become the core of a site: its journal follows the site's stream until it has the
-// lease and the journal has all that was stored before. Then a server may start on the journal, and
-// a bridge of role core with the same holder's name beside it.
+// A host that may become the core of a site. Its journal follows the site's stream until the host
+// has the lease and the journal has everything that was stored before. Then a server may start with
+// this journal, and beside it a bridge of role core with the same holder's name.
 
 #include <cstdint>
 #include <filesystem>
@@ -18,10 +18,10 @@ class Standby {
  public:
   Standby(const std::filesystem::path& journal, SiteStreams& streams, const std::string& holder);
 
-  // At about 10 Hz; true once this host is the core. Throws std::runtime_error when
-  // the journal cannot be that of the site, or be written.
+  // Call it at about 10 Hz. True once this host is the core. Throws std::runtime_error when the
+  // journal is another site's or cannot be written.
   bool Step(int64_t now_utime);
-  // For people.
+  // The state, for people.
   std::string Said() const;
 
  private:
@@ -29,7 +29,7 @@ class Standby {
   SiteStreams& streams_;
   SiteLease lease_;
   JournalCopy copy_;
-  uint64_t begin_ = 0;  // of our term in the stream; 0: we have none
+  uint64_t begin_ = 0;  // sequence of our term in the stream; 0: we do not have the lease
 };
 
 }  // namespace pangea

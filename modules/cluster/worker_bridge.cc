@@ -16,13 +16,13 @@ namespace {
 
 constexpr int64_t kWorkerSecond_us = 1'000'000;
 constexpr int64_t kRoundInterval_us = 20'000;
-// A match waits for the results that it rests on: looks again so soon, and for so long at most;
-// matches of a worker that died come after 5 s. Who is further behind is to catch up.
+// How often a match is checked for the earlier results that it waits for, and the longest wait. The
+// matches of a worker that died come after 5 s.
 constexpr int64_t kWait_us = 50'000;
 constexpr int64_t kMaxWait_us = 15'000'000;
 constexpr char kHandler[] = "agent_handler";
 
-// Who verifies candidates of this kind, and is to know the results on them.
+// The process that verifies candidates of this kind and must know their results.
 std::string VerifierOf(PlaceKind kind) {
   return kind == PlaceKind::kIntra ? "inter_map_ba" : "fusion";
 }
@@ -38,7 +38,7 @@ WorkerBridge::WorkerBridge(Bus& bus, SiteStreams& streams, size_t max_matches)
       keyframes_(streams.Keyframes()),
       results_(streams.Results()) {
   streams_.ListenToHave();
-  // For the site's journal: a replay verifies with the same.
+  // The verifiers' options go to the site's journal, so that a replay verifies with the same ones.
   node_.Subscribe<options_t>(std::string(channels::kAllOptions),
                              [this](const std::string&, const options_t& options) {
                                streams_.PublishOptions(options.process, EncodeMessage(options));
@@ -149,7 +149,8 @@ void WorkerBridge::PassKeyframes() {
   }
 }
 
-// Only once the keyframes that it tells of were published: verifiers ask for all that they lack.
+// HAVE is published only after its keyframes, because verifiers ask for all keyframes that they
+// lack.
 void WorkerBridge::PassHave() {
   while (const auto data = streams_.NextHave()) {
     if (has_keyframes_) {
@@ -176,13 +177,13 @@ void WorkerBridge::PassResults() {
   }
 }
 
-// Whether our verifiers know all results that the match's candidates rest on. A match that is no
-// longer pending has all its results in the stream, so that is looked at after.
+// Whether our verifiers know all results that the match's candidates wait for. A match that is no
+// longer pending has all its results in the stream, so the results are read after that check.
 bool WorkerBridge::KnowsWhatItRestsOn(const PlaceMatch& match, int64_t now_utime) {
   if (!pending_.LetPass(match, now_utime)) {
     return false;
   }
-  // A node of NATS that lags behind may have fewer than there are.
+  // A node of NATS that lags behind may not have all results, so their end is compared.
   const auto end = streams_.ResultsEnd();
   PassResults();
   return end && results_.HasHad(*end);
@@ -207,7 +208,7 @@ void WorkerBridge::TakeMatches(int64_t now_utime) {
   }
 }
 
-// What a worker that died has stored is not made again.
+// Candidates whose result another worker, which may have died, has stored are left out.
 void WorkerBridge::TakeMatch(PlaceMatch match, const std::string& ack_subject, int64_t now_utime) {
   std::erase_if(match.candidates, [&](const PlaceCandidate& candidate) {
     return streams_.FindResult(match.query, ConstraintId(match.query, candidate)).has_value();
@@ -226,7 +227,8 @@ void WorkerBridge::AskForOverdue(int64_t now_utime) {
     for (const PlaceCandidate& candidate : match.candidates) {
       const int64_t constraint_id = ConstraintId(match.query, candidate);
       names.results.emplace_back(match.query.seq, constraint_id);
-      // NATS did not answer when this was looked for: our verifiers know it as another's.
+      // NATS did not answer when the match was taken; our verifiers know this result from another
+      // worker.
       if (streams_.FindResult(match.query, constraint_id)) {
         NoteStored(constraint_id);
       }

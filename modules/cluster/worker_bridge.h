@@ -1,19 +1,19 @@
 #pragma once
 
-// The bridge on a worker host, role worker: on a bus of its own with pangea-fusion and
-// pangea-inter-map-ba, to which it is agent_handler. Keyframes of the site's stream and HAVE go
-// onto the bus; it takes at most `max_matches` matches at a time from the queue, publishes them,
-// stores the results, and acknowledges a match once all its results are stored. Results of other
-// workers are passed on to the verifiers as those of former runs are. A match goes back into the
-// queue while results that its candidates rest on (core/candidates/candidate_order.h) are still to
-// come, for 15 s at most: so the map is the same however many workers there are.
+// The bridge on a worker host, role worker. It shares a bus with pangea-fusion and
+// pangea-inter-map-ba, and stands for the agent_handler there. It publishes the keyframes of the
+// site's stream, and HAVE. It takes at most `max_matches` matches at a time from the queue,
+// publishes them, stores their results, and acknowledges a match once all its results are stored.
+// It passes results of other workers to the verifiers, as those of former runs. While a match waits
+// for earlier results (core/candidates/candidate_order.h), it goes back into the queue, for at most
+// 15 s. So the map does not depend on the number of workers.
 //   bus: CONSTRAINT, OPTIONS_*, RESEND_REQUEST, AGAIN_agent_handler in;
 //        KEYFRAME_*, PLACE_MATCH, HAVE, VERDICT_REQUEST, AGAIN_<process>, STATUS_bridge out
 //
-// A result that got lost on the bus is asked for, and its match published again: a verifier takes
-// a match once and repeats what it has made. Requests for matches are not answered: a verifier asks
-// for those of all maps, and most are other workers'. A match of a worker that dies comes to
-// another. One thread.
+// If a result was lost on the bus, it is asked for, and its match is published again; a verifier
+// verifies a match only once, and repeats its results. Requests for matches are not answered,
+// because verifiers ask for those of all maps, and most of them belong to other workers. If a
+// worker dies, its matches go to others. Not thread safe.
 
 #include <cstdint>
 #include <deque>
@@ -35,7 +35,7 @@ namespace pangea {
 class WorkerBridge : public Process {
  public:
   WorkerBridge(Bus& bus, SiteStreams& streams, size_t max_matches);
-  ~WorkerBridge() override;  // gives back what it has not finished
+  ~WorkerBridge() override;  // gives unfinished matches back to the queue
   WorkerBridge(const WorkerBridge&) = delete;
   WorkerBridge& operator=(const WorkerBridge&) = delete;
 
@@ -44,16 +44,16 @@ class WorkerBridge : public Process {
   int longest_wait_ms() const override { return 20; }
 
  private:
-  // In one round, of which there are kRoundInterval_us between two: what fits receive buffers.
+  // Bounds for one round (one per kRoundInterval_us), so that the messages fit receive buffers.
   static constexpr int kKeyframes = 10;
   static constexpr int kResults = 50;
   static constexpr size_t kMaxRequests = 1000;
 
-  // What a verifier asked for: keyframes one by one, or a map's results.
+  // A verifier's request for keyframes, or for the results of a map.
   struct Request {
     std::string requester;
     SeqGap range;
-    std::optional<SiteStreams::Reader> results;  // of the map, where these were asked for
+    std::optional<SiteStreams::Reader> results;  // set for a request for results
   };
 
   void OnResult(const Constraint& result);
@@ -68,14 +68,14 @@ class WorkerBridge : public Process {
   void TakeMatch(PlaceMatch match, const std::string& ack_subject, int64_t now_utime);
   void NoteStored(int64_t constraint_id);
   void AnswerRequests();
-  // Whether there is more to answer.
+  // These send the next answer and return whether there is more to send.
   bool AnswerKeyframe(Request* request);
   bool AnswerResult(Request* request);
   void AskForOverdue(int64_t now_utime);
   void PublishStatus(int64_t now_utime);
 
   Node node_;
-  Node as_handler_;  // whom verifiers answer
+  Node as_handler_;  // named agent_handler, to which verifiers answer
   SiteStreams& streams_;
   const size_t max_matches_;
   OutstandingMatches outstanding_;
@@ -83,9 +83,9 @@ class WorkerBridge : public Process {
   SiteStreams::Reader keyframes_;
   SiteStreams::Reader results_;
   std::map<int64_t, SiteStreams::Entry> to_store_;  // results by constraint id
-  std::vector<std::string> done_;                   // acks that NATS has not yet
+  std::vector<std::string> done_;                   // ack subjects still to be acknowledged
   std::deque<Request> requests_;
-  bool has_keyframes_ = false;  // all that the stream had
+  bool has_keyframes_ = false;  // all keyframes of the stream were once published
   int64_t next_round_utime_ = 0;
   int64_t next_status_utime_ = 0;
   int64_t num_results_ = 0;

@@ -19,7 +19,7 @@ using nlohmann::json;
 
 constexpr int32_t kMaxAgentId = 65535;
 
-// 128 bits of it.
+// The first 128 bits of the code's SHA-256, in hexadecimal digits.
 std::string HashOf(const std::string& plain_code) {
   std::array<uint8_t, crypto_hash_sha256_BYTES> hash;
   crypto_hash_sha256(hash.data(), reinterpret_cast<const uint8_t*>(plain_code.data()),
@@ -31,7 +31,7 @@ std::string HashOf(const std::string& plain_code) {
   return hex;
 }
 
-// Nothing of a file that is not there, or not as it was written.
+// Nothing if the file does not exist or is not a JSON object.
 std::optional<json> ReadJson(const fs::path& file) {
   if (!Exists(file)) {
     return std::nullopt;

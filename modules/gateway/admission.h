@@ -1,17 +1,17 @@
 #pragma once
 
-// Who may join a site by a code, and who did, in the site's folder:
+// Who may join a site with a code, and who joined, in the site's folder:
 //
-//   gateway/invites/<hash>.json   an invite; SHA-256 of its code is its name, the code is nowhere
-//   gateway/agents/<id>.json      an agent that joined: its name and when; stays when it is
-//   revoked,
-//                                 so that nobody else gets its id, which is on its maps and anchors
-//   keys/agent_<id>.key           its key, which the agent_handler takes up; revoked is who has
-//   none
+//   gateway/invites/<hash>.json   an invite, named by the SHA-256 of its code (the first 128 bits);
+//                                 the code itself is not stored
+//   gateway/agents/<id>.json      an agent that joined: its name and when; stays after it is
+//                                 revoked, so that its id, which is on its maps and anchors, is not
+//                                 used again
+//   keys/agent_<id>.key           its key, which the agent_handler reads; an agent without a key is
+//                                 revoked
 //
-// Each is a file of its own that is there whole or not at all, so several programs may work here at
-// once and may be killed. A code is used up by removing its invite: the file system lets one do
-// that.
+// All files are written atomically, so several programs may work here at once, and may be killed. A
+// code is used up by removing its invite, which the file system lets only one program do.
 
 #include <cstdint>
 #include <filesystem>
@@ -38,26 +38,28 @@ struct JoinedAgent {
   int64_t joined_s = 0;  // since 1970
 };
 
-// gateway/ and what is above in it; nobody else looks into it. Throws std::runtime_error when it
-// cannot.
+// Makes the folder gateway/ and its folders above, readable only by the owner. Throws
+// std::runtime_error when it cannot.
 void MakeGatewayFolders(const site::Site& site);
 
 class Admission {
  public:
-  static constexpr int32_t kFirstAgent = 1001;  // below are those whose keys somebody made
+  static constexpr int32_t kFirstAgent = 1001;  // lower ids are for keys made by hand
   static constexpr size_t kMaxInvites = 1000;
 
   explicit Admission(const site::Site& site);
 
-  // The code. Throws std::runtime_error: there are too many, the disk refuses.
+  // Makes an invite and returns its code. Throws std::runtime_error if there are too many invites
+  // or the disk fails.
   std::string Make(const Invite& invite);
-  // Uses up the code for a key of a new agent: the key is on the disk before, and nobody gets it
-  // after a crash in between.
+  // Uses up the code and returns the key of a new agent. The key is written to the disk before the
+  // code is used up; after a crash in between, nobody has got that key.
   JoinResult Join(const JoinRequest& request, int64_t now_s);
-  // Takes the agent's key away. Throws std::runtime_error if it has none.
+  // Removes the agent's key. Throws std::runtime_error if it has none.
   void Revoke(int32_t agent_id);
 
-  // Those that are still open; removes those that have expired. A file that is none is left out.
+  // The invites that are still open; expired ones are removed. Files that are no invites are
+  // ignored.
   std::vector<Invite> Invites(int64_t now_s);
   std::map<int32_t, JoinedAgent> Agents() const;
 
@@ -65,7 +67,7 @@ class Admission {
   std::filesystem::path InviteFile(const std::string& plain_code) const;
   std::filesystem::path AgentFile(int32_t agent_id) const;
   std::filesystem::path KeyFile(int32_t agent_id) const;
-  // A new agent with a key.
+  // Makes a new agent with a key and returns its id.
   int32_t MakeAgent(const std::string& name, AnchorRight anchors, int64_t now_s);
   bool HasRoom() const;
 

@@ -1,6 +1,7 @@
 #pragma once
 
-// One agent's WebSocket: a nonce down, proof of the agent's key up, then what the socket is for.
+// The WebSocket of one agent. The server sends a nonce, the agent proves that it has its key, then
+// the subclass' messages follow.
 
 #include <array>
 #include <cstdint>
@@ -14,14 +15,14 @@
 
 namespace pangea {
 
-// HMAC-SHA-256 under the agent's key of "pangea-gateway-v1:", the agent's id in decimal digits, ":"
-// and the nonce's bytes.
+// The proof: HMAC-SHA-256, with the agent's key, of "pangea-gateway-v1:", the agent's id in decimal
+// digits, ":" and the nonce's bytes.
 inline constexpr size_t kProofBytes = 32;
 using GatewayNonce = std::array<uint8_t, 32>;
 std::array<uint8_t, kProofBytes> GatewayProof(const SecretKey& key, int32_t agent_id,
                                               const GatewayNonce& nonce);
 
-// Why a conversation was ended, for the page.
+// The reasons for closing a socket, for the page.
 inline const web::WebEnding kNotKnown{4401, "the key is wrong, or was revoked"};
 inline const web::WebEnding kNoProof{4408, "no proof of a key within 5 s"};
 inline const web::WebEnding kReplaced{4409, "another connection of this agent took its place"};
@@ -29,11 +30,11 @@ inline const web::WebEnding kTooMany{4429, "too many are connected"};
 
 class AgentSocket;
 
-// Who opens sockets; outlives them.
+// The owner of sockets; it must outlive them.
 class AgentSocketOwner {
  public:
   virtual ~AgentSocketOwner() = default;
-  // Whether the proof is its agent's; else the socket has been ended.
+  // Returns whether the proof is right; if not, it has ended the socket.
   virtual bool OnProof(AgentSocket* socket, Bytes proof) = 0;
   virtual void OnRefused(const std::string& why) = 0;
   virtual void OnGone(AgentSocket* socket) = 0;
@@ -52,7 +53,7 @@ class AgentSocket : public web::WebPeer {
   int32_t agent_id() const { return agent_id_; }
   const GatewayNonce& nonce() const { return nonce_; }
   bool proven() const { return proven_; }
-  // Refuses it; nothing that waits goes out any more.
+  // Closes the socket because of an error. Waiting messages are not sent any more.
   virtual void End(const web::WebEnding& ending);
 
   bool is_text() const final { return false; }
@@ -61,12 +62,12 @@ class AgentSocket : public web::WebPeer {
   std::optional<web::WebEnding> Ending() const final { return ending_; }
 
  protected:
-  // The key is proven. False: it has been ended all the same.
+  // Called when the key is proven. Returns false if the socket has been ended nevertheless.
   virtual bool Begin() = 0;
   virtual std::optional<std::vector<uint8_t>> NextMessage() = 0;
   virtual bool ReceiveMessage(Bytes message) = 0;
 
-  // Ends it as it should.
+  // Closes the socket normally.
   void Finish(const web::WebEnding& ending) { ending_ = ending; }
   int64_t now_us() const { return owner_.now_us(); }
 

@@ -1,7 +1,7 @@
 #pragma once
 
-// How often somebody may be wrong: kBurst times at once from one address, then once in
-// kInterval_us. Bounded: kMaxAddresses; while more were wrong of late, no further one may try.
+// Limits wrong attempts: kBurst at once from one address, then one per kInterval_us. Bounded: while
+// kMaxAddresses had wrong attempts recently, no further address may try.
 
 #include <cstdint>
 #include <map>
@@ -15,12 +15,12 @@ class AttemptLimit {
   static constexpr int64_t kInterval_us = 6'000'000;
   static constexpr size_t kMaxAddresses = 1000;
 
-  // `now_us`: a clock that never steps.
+  // `now_us`: monotonic clock.
   bool MayTry(const std::string& address, int64_t now_us);
   void NoteWrong(const std::string& address, int64_t now_us);
 
  private:
-  // When the last of its wrong attempts is forgotten; each takes kInterval_us.
+  // By address, when its last wrong attempt is forgotten; each wrong attempt adds kInterval_us.
   std::map<std::string, int64_t> forgotten_us_;
 };
 

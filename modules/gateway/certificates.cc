@@ -89,7 +89,7 @@ std::string ToPem(EVP_PKEY* key) {
   return TextOf(memory.get());
 }
 
-// "a,b": the values of an extension.
+// The values of an extension as text: "a,b".
 std::string Joined(const std::vector<std::string>& values) {
   return fmt::format("{}", fmt::join(values, ","));
 }
@@ -102,12 +102,12 @@ void AddExtension(X509* certificate, X509* issuer, int kind, const std::string& 
   Check(extension != nullptr && X509_add_ext(certificate, extension.get(), -1) == 1, value.c_str());
 }
 
-// With a random number, from a day ago on: clocks differ.
+// A certificate with a random serial number. It is valid from a day ago, because clocks differ.
 Certificate NewCertificate(const std::string& name, EVP_PKEY* key, int64_t now_s, int days) {
   Certificate made(X509_new());
   std::array<uint8_t, 16> number{};
   Check(RAND_bytes(number.data(), static_cast<int>(number.size())) == 1, "random bytes");
-  number[0] = static_cast<uint8_t>((number[0] & 0x7f) | 0x40);  // positive, all its bytes used
+  number[0] = static_cast<uint8_t>((number[0] & 0x7f) | 0x40);  // positive, without leading zeros
   const std::unique_ptr<BIGNUM, Freer<BN_free>> big(
       BN_bin2bn(number.data(), static_cast<int>(number.size()), nullptr));
   Check(X509_set_version(made.get(), X509_VERSION_3) == 1 &&
@@ -126,7 +126,7 @@ void Sign(X509* certificate, EVP_PKEY* key) {
   Check(X509_sign(certificate, key, EVP_sha256()) > 0, "signing");
 }
 
-// With a mask that leaves this one address.
+// The address with a mask that allows only this address.
 std::string OneAddress(const std::string& address) {
   return address + (address.find(':') == std::string::npos
                         ? "/255.255.255.255"

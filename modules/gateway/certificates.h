@@ -1,12 +1,12 @@
 #pragma once
 
-// X.509 certificates as PEM texts: an authority of the gateway's own, and a server certificate that
-// it vouches for. Both have P-256 keys.
+// X.509 certificates as PEM texts: the gateway's own authority, and a server certificate that the
+// authority signs. Both have P-256 keys.
 //
-// A phone that trusts the authority trusts whoever has its key. So it can vouch only for addresses
-// of private networks, for names that no public authority gives out (.local, .lan, .internal,
-// .home.arpa), and for the names and addresses it was made with (RFC 5280, 4.2.1.10: name
-// constraints).
+// A phone that trusts the authority trusts whoever has the authority's key. So the authority is
+// restricted by name constraints (RFC 5280, 4.2.1.10): to addresses of private networks, to names
+// that no public authority signs (.local, .lan, .internal, .home.arpa), and to the names and
+// addresses with which it was made.
 
 #include <cstdint>
 #include <string>
@@ -16,23 +16,23 @@
 
 namespace pangea {
 
-// By which browsers may call this machine.
+// The names and addresses by which browsers may reach this machine.
 struct MachineNames {
   std::vector<std::string> hosts;      // "robot.local"
   std::vector<std::string> addresses;  // "192.168.1.7", "fd00::7"
 };
 
 inline constexpr int kAuthorityDays = 3650;
-inline constexpr int kServerDays = 396;  // and one before now; browsers take 398
+inline constexpr int kServerDays = 396;  // plus one day before now; browsers accept 398 days
 
 using Identity = web::TlsIdentity;  // a certificate and its key
 
-// `now_s`: since 1970. `names`: beyond those above.
+// Makes an authority. `now_s`: seconds since 1970. `names`: allowed in addition to those above.
 Identity MakeAuthority(const std::string& name, const MachineNames& names, int64_t now_s);
-// Whether certificate and key are of one pair, and the certificate is valid for `days` more.
+// Whether the certificate belongs to the key and is valid for `days` more.
 bool CanVouch(const Identity& authority, int64_t now_s, int days);
-// Names that the authority may not vouch for are left out, and returned; the chain has both
-// certificates.
+// Makes a server certificate signed by the authority; the chain has both certificates. Names that
+// the authority may not sign are left out, and returned.
 struct MadeCertificate {
   Identity identity;
   std::vector<std::string> left_out;
@@ -40,15 +40,15 @@ struct MadeCertificate {
 MadeCertificate MakeServerCertificate(const Identity& authority, const MachineNames& names,
                                       int64_t now_s);
 
-// Whether browsers that trust the authority take this certificate for all of the names from now_s
-// for `days` more. False for what is no certificate.
+// Whether browsers that trust the authority accept this certificate for all these names, from now_s
+// on for `days` more. False if a text is not a certificate.
 bool IsGoodFor(const Identity& server, const Identity& authority, const MachineNames& names,
                int64_t now_s, int days);
 
-// SHA-256 of the first certificate in the text, "AB:CD:...". Throws std::runtime_error if there is
-// none.
+// SHA-256 of the first certificate in the text, as "AB:CD:...". Throws std::runtime_error if there
+// is none.
 std::string Fingerprint(const std::string& certificate_pem);
-// As a file for a phone.
+// The certificate in DER, the file format that phones install.
 std::string ToDer(const std::string& certificate_pem);
 
 }  // namespace pangea

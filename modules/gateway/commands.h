@@ -8,7 +8,7 @@
 
 namespace pangea {
 
-// Adds the options of the gateway itself, and its sub-commands, which run when the app has parsed.
+// Adds the options of the gateway itself, and its subcommands, which run when the app parses them.
 void AddGatewayCommands(CLI::App& app, GatewayArguments* arguments);
 
 }  // namespace pangea

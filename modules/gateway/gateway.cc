@@ -23,8 +23,8 @@ WebAnswer Json(int status, const json& body) {
 
 WebAnswer Error(int status, const std::string& error) { return Json(status, {{"error", error}}); }
 
-// What the page may load and do. `host` is one that HostAllowed has let through: Safari takes
-// 'self' for wss: only of late.
+// The page's Content-Security-Policy. It names `host`, which HostAllowed has accepted, because only
+// new versions of Safari accept 'self' for wss:.
 std::string PagePolicy(const std::string& host) {
   return fmt::format(
       "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; worker-src 'self' blob:; "
@@ -34,7 +34,7 @@ std::string PagePolicy(const std::string& host) {
       host);
 }
 
-// "/link?agent=7" is 7, for "/link".
+// The agent of a target: 7 for the target "/link?agent=7" and the path "/link".
 std::optional<int32_t> AgentOf(std::string_view target, std::string_view path) {
   constexpr std::string_view kAgent = "?agent=";
   if (!target.starts_with(path) || !target.substr(path.size()).starts_with(kAgent)) {
@@ -49,7 +49,7 @@ std::optional<int32_t> AgentOf(std::string_view target, std::string_view path) {
              : std::nullopt;
 }
 
-// Cuts off whose key is another one in `after`, or not there any more.
+// Closes the sockets of agents whose key has changed or is missing in `after`.
 template <typename Socket>
 void EndOthers(const std::map<int32_t, Gateway::Agent>& before,
                const std::map<int32_t, Gateway::Agent>& after,
@@ -66,7 +66,8 @@ void EndOthers(const std::map<int32_t, Gateway::Agent>& before,
   }
 }
 
-// Takes the place of the agent's former socket, or a free one.
+// The socket replaces the agent's former one, or takes a free place. False, and the socket is
+// closed, if there is no place.
 template <typename Socket>
 bool TakePlace(Socket* socket, size_t max_at_once, std::map<int32_t, Socket*>* sockets) {
   if (const auto former = sockets->find(socket->agent_id()); former != sockets->end()) {
@@ -145,7 +146,7 @@ WebAnswer Gateway::File(const WebRequest& request) const {
     return {200, "application/x-x509-ca-cert", public_.authority_der};
   }
   WebAnswer answer = web::AnswerFile(public_.page, request, PagePolicy(request.host));
-  // So that the page may use shared memory; and tells nobody where it was.
+  // The first two headers let the page use shared memory. The third hides its address from others.
   answer.headers.emplace_back("Cross-Origin-Opener-Policy", "same-origin");
   answer.headers.emplace_back("Cross-Origin-Embedder-Policy", "require-corp");
   answer.headers.emplace_back("Referrer-Policy", "no-referrer");
@@ -173,7 +174,7 @@ bool Gateway::OnProof(AgentSocket* socket, Bytes proof) {
   unproven_.remove(socket);
   const int32_t agent_id = socket->agent_id();
   const auto agent = agents_.find(agent_id);
-  // The same work for an agent that nobody knows.
+  // An unknown agent costs the same work, so that timing does not reveal which agents exist.
   const SecretKey key = agent == agents_.end() ? SecretKey::Random() : agent->second.key;
   const auto expected = GatewayProof(key, agent_id, socket->nonce());
   if (proof.size() == expected.size() &&

@@ -1,18 +1,18 @@
 #pragma once
 
-// The gateway as a web site: the phone's page, joining, and each agent's link socket. No socket,
-// bus, clock or file: the owner gives requests, the time, the keys and the packets that go down,
-// and gets those that come up.
+// The gateway as a web site: the phone's page, joining, and the agents' WebSockets. It has no
+// network socket, bus, clock or file: the owner provides requests, the time, the keys and the
+// packets that go down, and gets the packets that come up. Not thread safe.
 //
 //   GET  /...                the page
-//   GET  /ca.crt             the certificate authority, for a phone that is to trust it
+//   GET  /ca.crt             the certificate of the authority, for a phone that should trust it
 //   GET  /v1/info            {"site", "version", "agents": [{"agent", "name", "connected"}]}
 //   POST /v1/join            {"code", "name"}: {"agent", "key", "site"}, or {"error"}
 //   WS   /link?agent=K       link_socket.h
 //   WS   /recording?agent=K  recording/recording_socket.h
 //
-// Bounded: kMaxAgentsAtOnce have proven their key, kMaxUploads of them upload; of those that have
-// not, the oldest gives way to the one after kMaxUnproven.
+// Bounds: kMaxAgentsAtOnce link sockets and kMaxUploads uploads with a proven key, and kMaxUnproven
+// sockets without; a further unproven one replaces the oldest.
 
 #include <functional>
 #include <list>
@@ -28,11 +28,11 @@
 
 namespace pangea {
 
-// What becomes of a good request to join.
+// The result of a valid request to join.
 struct JoinResult {
   static constexpr int kWrongCode = 403;
   int status = 200;
-  std::string error;  // for the visitor, unless the status is 200
+  std::string error;  // for the visitor, if the status is not 200
   int32_t agent_id = 0;
   std::string key_hex;
 };
@@ -40,16 +40,16 @@ struct JoinResult {
 class Gateway : public web::WebSite, public LinkSocketOwner, public RecordingSocketOwner {
  public:
   static constexpr size_t kMaxAgentsAtOnce = 100;
-  static constexpr size_t kMaxUnproven = kMaxAgentsAtOnce;  // all come back at once
+  static constexpr size_t kMaxUnproven = kMaxAgentsAtOnce;  // all agents may return at once
   static constexpr size_t kMaxUploads = 4;
-  // All, and as many that are being told to go.
+  // All sockets, and as many that are being closed.
   static constexpr int kMaxPeers = 2 * (kMaxAgentsAtOnce + kMaxUnproven + kMaxUploads);
 
   struct Public {
-    std::string site;  // its name
+    std::string site;  // the site's name
     std::string version;
     web::Page page;
-    std::string authority_der;  // empty: a certificate of the user's own
+    std::string authority_der;  // empty: the user has an own certificate
   };
   struct Agent {
     SecretKey key;
@@ -62,13 +62,13 @@ class Gateway : public web::WebSite, public LinkSocketOwner, public RecordingSoc
     std::function<void()> dropped;
   };
 
-  // `recordings` outlives it.
+  // `recordings` must outlive the gateway.
   Gateway(Public what, Events events, RecordingStore& recordings)
       : public_(std::move(what)), events_(std::move(events)), recordings_(recordings) {}
 
-  // Often; a clock that never steps.
+  // Call it often. `now_us`: monotonic clock.
   void SetNow(int64_t now_us) { now_us_ = now_us; }
-  // Those who may connect. Whoever is not among them any more, or has another key, is cut off.
+  // Sets the agents that may connect. Sockets of other agents, or with another key, are closed.
   void SetAgents(std::map<int32_t, Agent> agents);
   void SendDown(int32_t agent_id, Bytes packet);
   int64_t num_connected() const { return static_cast<int64_t>(connected_.size()); }

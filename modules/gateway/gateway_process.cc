@@ -17,7 +17,7 @@ constexpr int64_t kSecond_us = 1'000'000;
 web::WebOptions WithIdentity(const GatewayProcess::Options& options) {
   web::WebOptions web = options.web;
   web.tls = options.identity.server;
-  web.for_programs = true;  // pages of other origins get nothing; an agent that is no page may come
+  web.for_programs = true;  // refuse pages of other origins; an agent need not be a page
   web.max_peers = Gateway::kMaxPeers;
   return web;
 }
@@ -73,7 +73,7 @@ JoinResult GatewayProcess::Join(const JoinRequest& request) {
     JoinResult result = admission_.Join(request, now_utime_ / kSecond_us);
     if (result.status == 200) {
       node_.Count("joined");
-      LookForKeys();  // so that it may connect at once
+      LookForKeys();  // so that the new agent can connect at once
     }
     return result;
   } catch (const std::exception& error) {
@@ -97,8 +97,8 @@ void GatewayProcess::ReadAgents() {
   gateway_.SetAgents(agents_);
 }
 
-// As agent_handler does: without the folder all stay as they were, but none keeps in whose own file
-// was taken away.
+// As the agent_handler does: if the folder cannot be read, all keys stay valid, except those whose
+// own file was removed.
 void GatewayProcess::LookForKeys() {
   try {
     if (key_folder_.Changed()) {
@@ -127,7 +127,7 @@ void GatewayProcess::Tick(int64_t now_utime) {
 
 void GatewayProcess::PublishStatus(int64_t now_utime) {
   node_.Set("connected", gateway_.num_connected());
-  // The viewer shows address and fingerprint as they are here.
+  // The viewer shows this summary, with address and fingerprint.
   node_.PublishStatus(
       now_utime, 0,
       fmt::format("{} (certificate's SHA-256 {}): {} of {} agents connected", address_.url,

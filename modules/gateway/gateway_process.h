@@ -1,10 +1,11 @@
 #pragma once
 
-// The gateway between phones' browsers and the link bus, on one thread.
+// The gateway process, between phones' browsers and the link bus, on one thread.
 //   HTTPS, WSS  gateway.h
 //   link bus    LINK_DOWN_* in; LINK_UP_k out
 //   server bus  STATUS_gateway out
-// Keys and names are looked at each second, so that agents come and go while it runs.
+// Keys and names are read again every second if they changed, so agents can join and leave while it
+// runs.
 
 #include <cstdint>
 #include <string>
@@ -23,19 +24,19 @@ class GatewayProcess {
  public:
   static constexpr int64_t kDefaultMaxRecordings = 20'000'000'000;
   struct Options {
-    web::WebOptions web;  // without `tls`, which is the identity's
+    web::WebOptions web;  // `tls` is not used; `identity` has it
     web::Page page;
     GatewayIdentity identity;
-    std::string url_host;                            // by which phones reach it
-    int64_t max_recordings = kDefaultMaxRecordings;  // bytes, all that are kept together
+    std::string url_host;                            // the host in the URL for phones
+    int64_t max_recordings = kDefaultMaxRecordings;  // bytes, for all recordings together
   };
 
-  // Throws std::runtime_error: it cannot listen there, the site's folder cannot be used.
+  // Throws std::runtime_error if it cannot listen or the site's folder cannot be used.
   GatewayProcess(Bus& link_bus, Bus& server_bus, const site::Site& site, const Options& options);
 
-  // Handles requests and sockets, for `timeout_ms` or what there is.
+  // Handles requests and sockets for `timeout_ms`; with 0, only what is already there.
   void Serve(int timeout_ms);
-  // About 10 times a second; the wall clock, as process.h has it.
+  // Call it at about 10 Hz. `now_utime`: wall clock, as for Process::Tick.
   void Tick(int64_t now_utime);
 
   const GatewayAddress& address() const { return address_; }

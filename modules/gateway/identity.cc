@@ -18,7 +18,7 @@ using nlohmann::json;
 constexpr mode_t kPublic = 0644;
 constexpr int kRenewBefore_days = 30;
 
-// The key first: a certificate that is there has its key.
+// The key is written first, so that a certificate always has its key.
 void WriteIdentity(const fs::path& folder, const std::string& name, const Identity& identity) {
   ReplaceFile(folder / (name + ".key"), identity.private_key_pem, kOwnerOnly);
   ReplaceFile(folder / (name + ".pem"), identity.certificate_chain_pem, kPublic);

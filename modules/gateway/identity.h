@@ -1,12 +1,11 @@
 #pragma once
 
-// By what the gateway is known, in the site's folder:
+// The gateway's certificates and address, in the site's folder:
 //
 //   gateway/ca.pem, ca.key           its authority, made at the first start; ca.key has mode 0600
-//   gateway/server.pem, server.key   its certificate; made again at a start when it runs out within
-//                                    30 days, or the machine has another name or address
-//   gateway/address.json             where it was last reached: "url", "fingerprint" of the
-//   authority
+//   gateway/server.pem, server.key   its certificate; made again at a start if it expires within 30
+//                                    days, or if the machine has another name or address
+//   gateway/address.json             its last address: "url", and the authority's "fingerprint"
 
 #include <string>
 #include <vector>
@@ -19,12 +18,13 @@ namespace pangea {
 struct GatewayIdentity {
   Identity server;
   std::string authority_pem;          // empty: the certificate is the user's own
-  std::vector<std::string> left_out;  // names that the authority may not vouch for
+  std::vector<std::string> left_out;  // names that the authority may not sign
 };
 
-// Reads it, and makes what is missing. Throws std::runtime_error naming the file and the mend.
+// Reads the certificates and makes those that are missing. Throws std::runtime_error with the file
+// and advice.
 GatewayIdentity OpenIdentity(const site::Site& site, const MachineNames& names, int64_t now_s);
-// The user's own, of PEM files. Throws std::runtime_error.
+// Reads the user's own certificate and key from PEM files. Throws std::runtime_error.
 GatewayIdentity ReadIdentity(const std::string& certificate_file, const std::string& key_file);
 
 struct GatewayAddress {
@@ -32,7 +32,7 @@ struct GatewayAddress {
   std::string fingerprint;  // of the authority, or of the user's certificate
 };
 void WriteAddress(const site::Site& site, const GatewayAddress& address);
-// Throws std::runtime_error: the gateway never ran here.
+// Throws std::runtime_error if the gateway never ran on this site.
 GatewayAddress ReadAddress(const site::Site& site);
 
 }  // namespace pangea

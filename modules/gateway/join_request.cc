@@ -54,7 +54,7 @@ std::string PlainJoinCode(std::string_view text) {
 }
 
 bool IsVisitorName(std::string_view text) {
-  // dump() throws for what is no UTF-8.
+  // dump() throws if the text is not UTF-8.
   const auto is_utf8 = [&] {
     try {
       return !json(text).dump().empty();

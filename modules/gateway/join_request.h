@@ -1,7 +1,7 @@
 #pragma once
 
-// The body of POST /v1/join, and the words that a code is made of. Past ParseJoinRequest both
-// fields are bounded.
+// The body of POST /v1/join, and the format of a code. After ParseJoinRequest both fields are
+// within bounds.
 
 #include <string>
 #include <string_view>
@@ -9,23 +9,24 @@
 
 namespace pangea {
 
-// A code has 80 random bits: 16 of Crockford's 32 letters and digits, "ABCD-EFGH-JKMN-PQRS".
+// A code has 80 random bits: 16 of the 32 characters of Crockford's base 32, "ABCD-EFGH-JKMN-PQRS".
 inline constexpr size_t kCodeLetters = 16;
 std::string NewJoinCode();
-// As it was made, whatever of case and dashes a person changed, and with the letters that look like
-// digits taken for these; empty for what is no code.
+// The code without dashes and in upper case, with letters that look like digits replaced by these;
+// so it does not matter how a person typed it. Empty if the text is not a code.
 std::string PlainJoinCode(std::string_view text);
 
 struct JoinRequest {
-  std::string code;  // plain
+  std::string code;  // as PlainJoinCode returns it
   std::string name;  // UTF-8 without control characters, at most 60 bytes; may be empty
 };
 
 inline constexpr size_t kMaxVisitorName = 60;
-// What may stand for a person or a phone.
+// Whether the text may be the name of a person or phone: see JoinRequest::name.
 bool IsVisitorName(std::string_view text);
 
-// Of {"code": TEXT, "name": TEXT}, the name may be left out; or what is wrong, for the visitor.
+// Parses {"code": TEXT, "name": TEXT}; the name may be missing. The string says what is wrong, for
+// the visitor.
 std::variant<JoinRequest, std::string> ParseJoinRequest(std::string_view body);
 
 }  // namespace pangea

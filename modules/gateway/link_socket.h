@@ -1,8 +1,9 @@
 #pragma once
 
-// An agent's link over a WebSocket: sealed link packets both ways, a message each. Nothing is
-// opened here. Bounded: kMaxQueue_bytes wait to go down (the oldest is dropped for a new one: the
-// link repeats what counts), kRate_bytes_per_s come up (what is beyond is dropped).
+// An agent's link over a WebSocket: sealed link packets in both directions, one per message. They
+// are not decrypted here. Bounded: kMaxQueue_bytes wait to go down (beyond that the oldest packet
+// is dropped, because the link repeats what is lost), and kRate_bytes_per_s come up (beyond that,
+// packets are dropped).
 
 #include <deque>
 #include <vector>
@@ -18,16 +19,16 @@ class LinkSocket;
 
 class LinkSocketOwner : public AgentSocketOwner {
  public:
-  // Whether the agent's link is this one from now on; else it has been ended.
+  // Makes this socket the agent's link. False if the socket has been ended instead.
   virtual bool OnLink(LinkSocket* socket) = 0;
   virtual void OnPacketUp(int32_t agent_id, Bytes packet) = 0;
-  virtual void OnDropped() = 0;  // a packet
+  virtual void OnDropped() = 0;  // a packet was dropped
 };
 
 class LinkSocket : public AgentSocket {
  public:
   static constexpr size_t kMaxQueue_bytes = 256'000;
-  static constexpr double kRate_bytes_per_s = 4e6;  // as an uplink sends at most by default
+  static constexpr double kRate_bytes_per_s = 4e6;  // the default bandwidth of an uplink
   static constexpr double kBurst_bytes = 1e6;
 
   LinkSocket(LinkSocketOwner& owner, int32_t agent_id)

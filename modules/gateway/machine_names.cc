@@ -20,7 +20,7 @@ std::string TextOf(const sockaddr& address, socklen_t size) {
     return "";
   }
   const std::string host = text.data();
-  return host.substr(0, host.find('%'));  // of "fe80::1%eth0"
+  return host.substr(0, host.find('%'));  // "fe80::1%eth0" without the interface
 }
 
 std::vector<std::string> AddressesOfInterfaces() {
@@ -44,13 +44,13 @@ std::vector<std::string> AddressesOfInterfaces() {
   return addresses;
 }
 
-// No packet is sent: the kernel says where it would go out.
+// Asks the kernel from which address a packet to other networks would go; no packet is sent.
 std::string AddressOfRouteOut() {
   const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   sockaddr_in other{};
   other.sin_family = AF_INET;
   other.sin_port = htons(9);
-  inet_pton(AF_INET, "192.0.2.1", &other.sin_addr);  // nobody's (RFC 5737)
+  inet_pton(AF_INET, "192.0.2.1", &other.sin_addr);  // for documentation only (RFC 5737)
   sockaddr_in own{};
   socklen_t size = sizeof(own);
   const bool known = fd >= 0 &&

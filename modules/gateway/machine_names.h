@@ -1,6 +1,6 @@
 #pragma once
 
-// What this machine is called, and where it can be reached.
+// The names and addresses of this machine.
 
 #include <string>
 
@@ -8,11 +8,11 @@
 
 namespace pangea {
 
-// Its name, alone and with ".local", "localhost", and the addresses of its interfaces.
+// The host name alone and with ".local", "localhost", and the addresses of the interfaces.
 MachineNames NamesOfThisMachine();
 
-// The address of the interface that leads to other networks; else any that is not its own alone,
-// else 127.0.0.1.
+// The address of the interface that leads to other networks; else any address that other machines
+// can reach; else 127.0.0.1.
 std::string AddressForOthers(const MachineNames& names);
 
 }  // namespace pangea

@@ -1,4 +1,4 @@
-// pangea-gateway: lets phones' browsers in, over HTTPS and WebSockets.
+// pangea-gateway: lets the browsers of phones join a site, over HTTPS and WebSockets.
 
 #include <fmt/format.h>
 
@@ -17,7 +17,7 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
     if (!app.get_subcommands().empty()) {
-      return 0;  // it has run
+      return 0;  // the subcommand has run while parsing
     }
     if (arguments.site.empty()) {
       throw std::runtime_error("give --site FOLDER");

@@ -18,13 +18,13 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int64_t kTickInterval_us = 100'000;
-constexpr int kServe_ms = 10;  // so long a packet that goes down may wait
+constexpr int kServe_ms = 10;  // longest wait of a packet that goes down
 constexpr int kMaxMessagesAtOnce = 500;
 constexpr const char* kNoPageYet =
     "<!doctype html><meta charset=utf-8><meta name=viewport content=\"width=device-width\">"
     "<title>Pangea</title><p>This gateway works. Its page is not built: see docs/phone.md.";
 
-// Beside the binary, in the build tree as in an installation.
+// The page's folder relative to the binary, which is the same in the build tree and installed.
 fs::path DefaultPage() {
   return fs::read_symlink("/proc/self/exe").parent_path().parent_path() / "share" / "pangea" /
          "phone";
@@ -63,7 +63,7 @@ GatewayIdentity IdentityOf(const GatewayArguments& arguments, const site::Site& 
   return identity;
 }
 
-// What a phone is told to go to.
+// The host in the URL that phones are given.
 std::string UrlHost(const GatewayArguments& arguments, const MachineNames& names) {
   if (!arguments.hosts.empty()) {
     return arguments.hosts.front();

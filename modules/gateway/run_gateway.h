@@ -1,6 +1,6 @@
 #pragma once
 
-// The gateway's buses, its page, its names; and its loop.
+// Opens the gateway's buses, page and certificates, and runs its main loop.
 
 #include <string>
 #include <vector>
@@ -11,7 +11,7 @@ namespace pangea {
 
 struct GatewayArguments {
   std::string site;
-  std::string bus, link;  // LCM URLs; empty: the site's
+  std::string bus, link;  // LCM URLs; empty: those of the site
   web::WebOptions web{"0.0.0.0", 8443, {}};
   std::string certificate, key;  // files; empty: the gateway's own authority
   std::string page;              // folder; empty: the installed one
@@ -19,7 +19,7 @@ struct GatewayArguments {
   double recordings_gb = 1e-9 * static_cast<double>(GatewayProcess::kDefaultMaxRecordings);
 };
 
-// Serves until a signal. Throws std::runtime_error when it cannot begin.
+// Serves until a signal. Throws std::runtime_error when it cannot start.
 void RunGateway(const GatewayArguments& arguments);
 
 }  // namespace pangea

@@ -1,6 +1,6 @@
 #pragma once
 
-// For tests: an agent's end of its sockets, over TLS.
+// For tests: the agent's end of a gateway socket, over TLS.
 
 #include <fmt/format.h>
 
@@ -25,7 +25,7 @@ class GatewayAgent {
     client_.Send(web::MaskedFrame(std::string(packet.begin(), packet.end()), web::Frame::kBinary));
   }
 
-  // Packets that came since the last call. Answers the nonce.
+  // The packets received since the last call. Also answers the nonce.
   std::vector<std::string> Received() {
     received_ += client_.Received();
     TakeAnswer();

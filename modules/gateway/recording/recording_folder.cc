@@ -61,7 +61,7 @@ fs::path RecordingFolder::NewName(int32_t agent_id) const {
   return file;
 }
 
-// Also for what is under way and not yet written.
+// Whether there is room for `bytes` and for the full size of all uploads that are under way.
 bool RecordingFolder::HasRoomFor(int64_t bytes) const {
   int64_t under_way = bytes;
   for (const auto& [agent_id, upload] : uploads_) {

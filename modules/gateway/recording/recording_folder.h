@@ -1,8 +1,8 @@
 #pragma once
 
-// The site's folder of recordings that pages have uploaded: recordings/<time>_agent_<id>.zip. What
-// is under way is recordings/agent_<id>.part, and gone when it ends unfinished or the gateway
-// starts again. Bounded: all files together, and room that stays on the disk.
+// The site's folder of uploaded recordings: recordings/<time>_agent_<id>.zip. An upload under way
+// is recordings/agent_<id>.part; it is removed if it is aborted, and when the gateway starts.
+// Bounded: the size of all files together, and kLeftOnDisk stays free on the disk.
 
 #include <cstdint>
 #include <filesystem>
@@ -17,7 +17,7 @@ class RecordingFolder : public RecordingStore {
  public:
   static constexpr int64_t kLeftOnDisk = 1'000'000'000;  // bytes
 
-  // At most `max_bytes` in the folder. Throws std::filesystem::filesystem_error.
+  // `max_bytes`: bound for all files in the folder. Throws std::filesystem::filesystem_error.
   RecordingFolder(std::filesystem::path folder, int64_t max_bytes);
   ~RecordingFolder() override;
   RecordingFolder(const RecordingFolder&) = delete;
@@ -31,7 +31,7 @@ class RecordingFolder : public RecordingStore {
  private:
   struct Upload {
     int fd = -1;
-    int64_t bytes = 0;  // in the end
+    int64_t bytes = 0;  // size of the finished file
   };
   std::filesystem::path PartOf(int32_t agent_id) const;
   std::filesystem::path NewName(int32_t agent_id) const;

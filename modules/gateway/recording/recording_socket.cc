@@ -25,7 +25,7 @@ std::vector<uint8_t> BytesOf(int64_t value) {
   return bytes;
 }
 
-// A zip begins with its first file.
+// Whether the bytes are the signature with which a zip begins.
 bool IsBeginOfZip(Bytes bytes) {
   return bytes.size() >= 4 && bytes[0] == 'P' && bytes[1] == 'K' && bytes[2] == 3 && bytes[3] == 4;
 }

@@ -1,13 +1,14 @@
 #pragma once
 
-// A recording that a page uploads over a WebSocket. After the proof, all integers little-endian:
+// Upload of a recording by a page over a WebSocket. After the proof (integers are little-endian):
 //
 //   up    uint64 size of the zip; then its bytes, in messages of at most kMaxMessage
-//   down  uint64 bytes that are taken so far: at first 0. No more than kWindow may be sent beyond
-//         them. Closed with kKept and the file's name when all are kept, else with the reason.
+//   down  uint64 number of bytes taken so far, first 0. The page may send at most kWindow bytes
+//         beyond it. When all bytes are kept, the socket is closed with kKept and the file's name;
+//         otherwise with the reason.
 //
-// Bounded: kMaxRecording bytes, kRate_bytes_per_s (what is taken is told no faster), kStalled_us
-// without a byte.
+// Bounds: kMaxRecording bytes; kRate_bytes_per_s, at which the number of bytes taken grows at most;
+// kStalled_us without a byte.
 
 #include <string>
 
@@ -16,19 +17,19 @@
 
 namespace pangea {
 
-// Where recordings are kept; one at a time of an agent. Errors are texts for the visitor; empty:
-// there is none.
+// Keeps recordings; an agent uploads one at a time. Errors are texts for the visitor; an empty text
+// means no error.
 class RecordingStore {
  public:
   struct Kept {
-    std::string file;  // its name
+    std::string file;  // name of the file
     std::string error;
   };
   virtual ~RecordingStore() = default;
   virtual std::string Begin(int32_t agent_id, int64_t bytes) = 0;
   virtual std::string Write(int32_t agent_id, Bytes data) = 0;
   virtual Kept Finish(int32_t agent_id) = 0;
-  // Forgets what is not finished, if anything.
+  // Removes the agent's unfinished upload, if there is one.
   virtual void Abort(int32_t agent_id) = 0;
 };
 
@@ -36,7 +37,7 @@ class RecordingSocket;
 
 class RecordingSocketOwner : public AgentSocketOwner {
  public:
-  // Whether the agent's upload is this one from now on; else it has been ended.
+  // Makes this socket the agent's upload. False if the socket has been ended instead.
   virtual bool OnUpload(RecordingSocket* socket) = 0;
   virtual RecordingStore& recordings() = 0;
 };
@@ -67,11 +68,11 @@ class RecordingSocket : public AgentSocket {
   void Abort();
 
   RecordingSocketOwner& owner_;
-  int64_t size_ = 0;        // 0: not yet told
-  int64_t received_ = 0;    // bytes
-  int64_t told_ = -1;       // that are taken
-  bool is_stored_ = false;  // the store has something of it
-  int64_t last_us_ = 0;     // when something came
+  int64_t size_ = 0;        // 0: not received yet
+  int64_t received_ = 0;    // bytes received
+  int64_t told_ = -1;       // bytes taken, as last sent to the page; -1: nothing was sent
+  bool is_stored_ = false;  // the store has an unfinished upload
+  int64_t last_us_ = 0;     // when the last message came
   Pacer rate_{kRate_bytes_per_s, static_cast<double>(kWindow)};
 };
 
