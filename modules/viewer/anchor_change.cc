@@ -5,7 +5,7 @@
 namespace pangea::viewer {
 namespace {
 
-// Of the keyframes of a group that have come. There is one: the page has named it.
+// The nearest one of the group's keyframes that have arrived; at least the one named by the page.
 const SceneKeyframe& NearestKeyframe(const Scene& scene, const MapId& group,
                                      const Eigen::Vector3d& p_map, const SceneKeyframe& named) {
   const SceneKeyframe* nearest = &named;
@@ -23,7 +23,7 @@ const SceneKeyframe& NearestKeyframe(const Scene& scene, const MapId& group,
   return *nearest;
 }
 
-// The rotation it has now, if that is one in this group's frame; else upright.
+// The anchor's current rotation if it is known in this group's frame; else upright.
 Eigen::Quaterniond RotationOf(const AnchorState* known, const MapId& group) {
   return known != nullptr && known->map == group ? known->T_odom_anchor.q
                                                  : Eigen::Quaterniond::Identity();

@@ -1,6 +1,6 @@
 #pragma once
 
-// What somebody at a page wants of the anchors, and the edit that it makes.
+// A change of an anchor that somebody makes on a page, and the edit that follows from it.
 
 #include <cstdint>
 #include <optional>
@@ -12,15 +12,15 @@
 namespace pangea::viewer {
 
 struct AnchorChange {
-  std::optional<AnchorId> anchor;  // which one; none: a new one
+  std::optional<AnchorId> anchor;  // nothing: a new anchor
   bool deleted = false;
-  std::string name;      // of a new one, at most kMaxAnchorName bytes
-  int64_t keyframe = 0;  // index into Scene::keyframes(); this and below: not read when deleted
-  Eigen::Vector3d p_body = Eigen::Vector3d::Zero();  // where to put it, in that keyframe's body
+  std::string name;      // only for a new anchor; at most kMaxAnchorName bytes
+  int64_t keyframe = 0;  // index into Scene::keyframes(); unused if deleted
+  Eigen::Vector3d p_body = Eigen::Vector3d::Zero();  // in that keyframe's body; unused if deleted
 };
 
-// As a tool on the server makes it: whole, relative to the keyframe of the group that is nearest to
-// the place. A new one has the id (0, created_utime) and stands upright; one that is moved keeps
+// The complete edit, as by a tool on the server, relative to the keyframe of the group nearest to
+// the new position. A new anchor has the id (0, created_utime) and is upright; a moved one keeps
 // its rotation. Nothing if there is no such anchor or keyframe.
 std::optional<AnchorEdit> EditOf(const Scene& scene, const AnchorChange& change,
                                  int64_t created_utime);

@@ -1,7 +1,7 @@
 #pragma once
 
-// Edits of anchors on their way into the journal: each said once a second until it is heard from
-// there, or for kPatience_us. Bounded. No bus, no clock.
+// Edits of anchors that are not in the journal yet. Each is published once per second until the
+// journal has it, at most for kPatience_us. Bounded. No bus, no clock.
 
 #include <cstdint>
 #include <map>
@@ -17,14 +17,14 @@ class AnchorRequests {
   static constexpr int64_t kPatience_us = 20'000'000;
   static constexpr size_t kMaxPending = 100;  // anchors
 
-  // An edit of an anchor whose last one is still on its way takes its place, one revision further.
-  // False: too many are on their way.
+  // Adds an edit. If an edit of the same anchor is still pending, it is replaced, with a revision
+  // one higher. False if too many edits are pending.
   bool Add(AnchorEdit edit, int64_t now_utime);
   // The journal has this revision of the anchor, or a later one.
   void Heard(const AnchorId& anchor, int64_t revision);
-  // What to say now.
+  // The edits to publish now.
   std::vector<AnchorEdit> Due(int64_t now_utime);
-  // Those that were not heard in time, each once.
+  // The edits that the journal did not get in time; they are removed.
   std::vector<AnchorEdit> TakeGivenUp(int64_t now_utime);
 
   size_t size() const { return pending_.size(); }

@@ -1,6 +1,6 @@
-// Writes the log of a session that never was, for measuring the viewer: agents walk in circles
-// through one hall, keyframes three times a second, poses ten times; from half way on they are one
-// group that is solved twice a second, with every pose moved by each solve, and has ten anchors.
+// Writes a synthetic log for measurements of the viewer. Agents walk in circles through one hall,
+// with three keyframes and ten poses per second. From half of the time on they are one group, which
+// is optimised twice per second; every optimisation moves all poses. The group has ten anchors.
 //   pangea-viewer-bench-log OUT.lcm AGENTS KEYFRAMES_PER_AGENT POINTS_PER_KEYFRAME
 
 #include <fmt/format.h>
@@ -30,8 +30,8 @@ constexpr int64_t kStep = kSecond / 30;  // keyframes every 10 steps, poses ever
 
 struct Plan {
   int agents = 12;
-  int keyframes = 120;  // of each agent
-  int points = 70;      // of each keyframe
+  int keyframes = 120;  // per agent
+  int points = 70;      // per keyframe
 };
 
 class BenchLog {
@@ -56,12 +56,12 @@ class BenchLog {
  private:
   static MapId MapOf(int agent) { return {agent, kStart}; }
 
-  // Circles of 3 m in a hall of 30 m.
+  // Agents walk on circles of 3 m in a hall of 30 m.
   static Rigid3 PoseOf(int agent, double time_s) {
     const double angle = 0.4 * time_s + agent;
     const Eigen::Vector3d centre(6.0 * (agent % 4), 6.0 * std::floor(agent / 4.0), 1.5);
     const Eigen::Vector3d out(std::cos(angle), std::sin(angle), 0);
-    // Camera axes are body axes here: z looks outwards.
+    // Here the camera axes are the body axes, and z looks outwards.
     Eigen::Matrix3d R;
     R.col(2) = out;
     R.col(1) = -Eigen::Vector3d::UnitZ();
@@ -100,7 +100,7 @@ class BenchLog {
     for (int i = 0; i < plan_.points; ++i) {
       Corner corner;
       corner.pixel = {u(random_), v(random_)};
-      corner.landmark_id = plan_.points * seq + i;  // new ones: each is drawn once
+      corner.landmark_id = plan_.points * seq + i;  // a new landmark: each is drawn once
       keyframe.corners.push_back(corner);
       const float inverse_depth = 1 / depth(random_);
       keyframe.points.push_back({i, inverse_depth, std::pow(0.05F * inverse_depth, 2.0F)});
@@ -145,7 +145,7 @@ class BenchLog {
     WriteAnchors();
   }
 
-  // In front of the first ten keyframes of agent 1.
+  // Puts the anchors in front of the first ten keyframes of agent 1.
   void WriteAnchors() {
     for (int n = 0; n < 10; ++n) {
       AnchorState anchor;

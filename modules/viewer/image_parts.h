@@ -1,7 +1,7 @@
 #pragma once
 
-// Puts images together that come in chunks (image_t). Bounded: kMaxPending images of an agent may
-// lack a chunk, the oldest go first; larger ones than kMaxImageBytes are refused.
+// Joins images that come in chunks (image_t). Bounded: kMaxPending images per agent may lack a
+// chunk (beyond that the oldest is dropped), and images above kMaxImageBytes are refused.
 
 #include <cstdint>
 #include <map>
@@ -19,7 +19,8 @@ class ImageParts {
   static constexpr size_t kMaxPending = 4;
   static constexpr int32_t kMaxImageBytes = 8'000'000;
 
-  // The whole image when this was the last chunk it lacked. `refused` says why a chunk is none.
+  // Adds a chunk. Returns the image if no other chunk is missing. `refused` says why a chunk is not
+  // valid.
   std::optional<ShownImage> Add(int32_t agent_id, const image_t& chunk, std::string* refused);
 
  private:

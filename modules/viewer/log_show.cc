@@ -35,7 +35,7 @@ LogShow::LogShow(const std::string& path, size_t max_solved_poses)
 void LogShow::Read(const std::string& path) {
   SceneEvents parser;
   std::map<AnchorId, AnchorState> anchors;
-  // Each is said again every ten seconds, for hours.
+  // Anchors are published again every ten seconds, for hours, so repeats are left out.
   const auto repeats_anchor = [&anchors](const SceneEvent& event) {
     const auto* state = std::get_if<AnchorState>(&event);
     if (state == nullptr) {
@@ -52,7 +52,7 @@ void LogShow::Read(const std::string& path) {
   double time_s = 0;
   const auto take = [&](const LogEvent& event) {
     begin = begin.value_or(event.utime);
-    // A logger's stamps are not always in order; the file is.
+    // The order in the file is right, but a logger's time stamps are not always in order.
     time_s = std::max(time_s, 1e-6 * static_cast<double>(event.utime - *begin));
     SceneEvents::Outcome outcome = parser.Parse(event.channel, event.data);
     num_refused_ += outcome.refused.empty() ? 0 : 1;
@@ -66,9 +66,10 @@ void LogShow::Read(const std::string& path) {
   }
 }
 
-// Only images of keyframes are shown; the others are most of what an agent's log holds.
+// Drops images that do not belong to a keyframe: they are never shown, and are most of an agent's
+// log.
 void LogShow::DropUnseenImages() {
-  std::map<int32_t, std::set<int64_t>> times;  // of keyframes, by agent
+  std::map<int32_t, std::set<int64_t>> times;  // times of keyframes, by agent
   for (const Timed& timed : events_) {
     if (const auto* keyframe = std::get_if<ShownKeyframe>(&timed.event)) {
       times[keyframe->id.map.agent_id].insert(keyframe->utime);
@@ -99,13 +100,14 @@ void LogShow::ThinStates(size_t max_poses) {
   };
   bool less = true;
   while (less && NumSolvedPoses() > max_poses) {
-    std::map<MapId, std::pair<int64_t, bool>> solves;  // of each group the one at hand: does it go?
+    std::map<MapId, std::pair<int64_t, bool>>
+        solves;  // by group: newest revision, and whether it is dropped
     less = std::erase_if(events_, [&](const Timed& timed) {
              const auto* state = std::get_if<MapState>(&timed.event);
              if (state == nullptr || !may_go(timed, *state)) {
                return false;
              }
-             auto& [revision, goes] = solves[state->group];  // all chunks of a state alike
+             auto& [revision, goes] = solves[state->group];  // the same for all chunks of a state
              goes = state->revision == revision ? goes : !goes;
              revision = state->revision;
              return goes;

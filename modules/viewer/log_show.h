@@ -1,7 +1,8 @@
 #pragma once
 
-// A captured log, to be played, stopped and looked at at any time. Read once, at the start; what is
-// drawn of it stays in memory. Going back builds the scene again from the beginning.
+// Shows a captured log, which can be played, stopped and searched. The log is read once, at the
+// start, and everything that is drawn stays in memory. To go back in time, the scene is built again
+// from the beginning.
 
 #include <memory>
 #include <string>
@@ -15,15 +16,15 @@ namespace pangea::viewer {
 
 class LogShow : public Show {
  public:
-  // Poses in solved states that are kept; of more, every second solve that changes no group and is
-  // not its group's last is left out until they fit (a pose is about 100 bytes).
+  // Bound for the optimised poses in memory (about 100 bytes each). While there are more, every
+  // second optimisation is left out that changes no group and is not the last of its group.
   static constexpr size_t kMaxSolvedPoses = 4'000'000;
 
-  // Of a damaged log what can be read. Throws std::runtime_error naming the log when it cannot be
-  // opened, is none, or shows nothing.
+  // Of a damaged log, shows what can be read. Throws std::runtime_error with the log's name when it
+  // cannot be opened, is not a log, or has nothing to show.
   explicit LogShow(const std::string& path, size_t max_solved_poses = kMaxSolvedPoses);
 
-  // The player's clock goes on by this much, if it plays.
+  // Advances the player's clock by `wall_s` seconds times the speed, if it plays.
   void Advance(double wall_s);
 
   const Scene& scene() const override { return *scene_; }
@@ -35,11 +36,11 @@ class LogShow : public Show {
   void Play(bool play) override;
   void SetSpeed(double speed) override { clock_.speed = speed; }
 
-  // Messages that were refused while reading.
+  // Number of messages that were refused while reading.
   int64_t num_refused() const { return num_refused_; }
-  // What of the log is lost.
+  // What could not be read of the log.
   const LogReadings& readings() const { return readings_; }
-  // In memory.
+  // Numbers of poses and anchor states in memory.
   size_t NumSolvedPoses() const;
   size_t NumAnchorStates() const;
 
@@ -63,7 +64,7 @@ class LogShow : public Show {
   ShowClock clock_;
   int64_t epoch_ = 0;
   std::unique_ptr<Scene> scene_;
-  size_t next_ = 0;  // into events_
+  size_t next_ = 0;  // index of the next event in events_
 };
 
 }  // namespace pangea::viewer

@@ -1,4 +1,4 @@
-// pangea-viewer: a bus or a log, in a browser.
+// pangea-viewer: shows a bus or a log in a browser.
 
 #include <fmt/format.h>
 
@@ -14,7 +14,7 @@ namespace {
 using namespace pangea;
 using namespace pangea::viewer;
 
-// The page lies beside the binary, in the build tree as in an installation.
+// The page's folder relative to the binary, which is the same in the build tree and installed.
 std::filesystem::path DefaultPage() {
   const std::filesystem::path binary = std::filesystem::read_symlink("/proc/self/exe");
   return binary.parent_path().parent_path() / "share" / "pangea" / "viewer";

@@ -1,7 +1,7 @@
 #pragma once
 
-// From a bus or a log to the browsers, until a signal to stop. Throws std::runtime_error for a bus
-// that cannot be opened, a log or a page that cannot be read, and a port that is taken.
+// Serves a bus or a log to browsers until a signal. Throws std::runtime_error if the bus cannot be
+// opened, the log or the page cannot be read, or the port is in use.
 
 #include <string>
 #include <vector>
@@ -11,11 +11,11 @@
 
 namespace pangea::viewer {
 
-// `agent_urls`: buses of agents, for their images. `pages`: whether they may change anchors.
+// `agent_urls`: buses of agents, for their images. `pages`: whether pages may change anchors.
 // `page`: folder of the built page.
 void ServeBus(const std::string& url, const std::vector<std::string>& agent_urls,
               ViewerProcess::Pages pages, const web::WebOptions& options, const std::string& page);
-// What of the log is lost is told on stderr at the start; returns the exit code (TellLosses).
+// Losses of the log are reported on stderr at the start. Returns the exit code (TellLosses).
 int ServeLog(const std::string& log, const web::WebOptions& options, const std::string& page);
 
 }  // namespace pangea::viewer

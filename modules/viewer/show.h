@@ -1,7 +1,7 @@
 #pragma once
 
-// What the pages look at: a bus, live, or a log with its controls. All pages of one server look at
-// the same time of it.
+// The source that the pages show: a live bus, or a log with player controls. All pages of one
+// server show the same time.
 
 #include <cstdint>
 #include <string>
@@ -12,11 +12,11 @@
 
 namespace pangea::viewer {
 
-// Seconds since the start of what is shown.
+// Times are seconds since the start of the bus' show or of the log.
 struct ShowClock {
   bool live = true;
   double now_s = 0;
-  double end_s = 0;  // of a log
+  double end_s = 0;  // end of a log
   bool playing = true;
   double speed = 1;
 };
@@ -26,17 +26,17 @@ class Show {
   virtual ~Show() = default;
 
   virtual const Scene& scene() const = 0;
-  // Another number: another scene, all of it is to be sent anew.
+  // A number that changes when the scene was built again; then all of it must be sent again.
   virtual int64_t epoch() const = 0;
   virtual ShowClock clock() const = 0;
   // The bus' URL or the log's file name, for people.
   virtual std::string source() const = 0;
-  // The whole log's, for marks on its slider.
+  // The fusions of the whole log, for marks on its slider.
   virtual std::vector<Fusion> all_fusions() const { return {}; }
 
-  // Whether pages may change anchors; of a log nobody may.
+  // Whether pages may change anchors; never those of a log.
   virtual bool editable() const { return false; }
-  // What cannot be done is told to all pages (Scene::Tell).
+  // If the change is not possible, all pages are told (Scene::Tell).
   virtual void Change(const AnchorChange&) {}
 
   virtual void Seek(double) {}

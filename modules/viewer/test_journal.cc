@@ -1,5 +1,5 @@
-// The part of a server that a test of the page needs to change anchors: what tools ask for gets its
-// number and is published as if journalled. pangea-anchors does the rest.
+// The part of a server that a test of the page needs to change anchors: it gives edits of tools
+// their number, and publishes them as if they were journalled. pangea-anchors does the rest.
 //   pangea-viewer-test-journal URL
 
 #include <iostream>

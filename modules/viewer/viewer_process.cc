@@ -15,7 +15,7 @@ namespace pangea::viewer {
 namespace {
 
 constexpr int64_t kSecond = 1'000'000;
-// What is beyond would not be shown anyway.
+// Keyframes beyond this number would not be shown anyway.
 constexpr auto kMaxSeqAsked = static_cast<int32_t>(Scene::kMaxKeyframes);
 
 }  // namespace
@@ -77,8 +77,8 @@ void ViewerProcess::AskForMissing(int64_t now_utime) {
   }
 }
 
-// Of equal revisions the higher agent's counts, and it is not ours: the anchor is then as ANCHOR
-// says.
+// An edit of another agent with the same revision also ends our request: of equal revisions the
+// higher agent id wins, and ours is 0. ANCHOR then shows the result.
 void ViewerProcess::OnAnchorEdit(const AnchorEdit& edit) {
   requests_.Heard(edit.anchor, edit.revision);
 }

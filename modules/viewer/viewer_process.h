@@ -1,10 +1,12 @@
 #pragma once
 
-// A live bus as a show: everything people may want to see of it in, STATUS_viewer out. A viewer
-// that starts late asks for the keyframes and verification results it missed, as any process does.
+// Shows a live bus. In: all messages that are shown. Out: STATUS_viewer, and requests: a viewer
+// that starts late asks for the keyframes and verification results that it missed, as any process
+// does.
 //
-// What people do to anchors goes out as ANCHOR_REQUEST_0, each edit once a second until ANCHOR_EDIT
-// or ANCHOR shows that it is in the journal; after 20 s the pages are told that it is not.
+// Changes of anchors by people are published on ANCHOR_REQUEST_0, each edit once per second until
+// ANCHOR_EDIT or ANCHOR shows that it is in the journal; after 20 s the pages are told that it
+// failed.
 
 #include <set>
 #include <string>
@@ -26,7 +28,7 @@ class ViewerProcess : public Process, public Show {
 
   ViewerProcess(Bus& bus, std::string source, int64_t start_utime, Pages pages = Pages::kEdit);
 
-  // An agent's own bus: its images, which do not go further.
+  // Also shows the images on an agent's own bus, which are not sent to the server.
   void WatchAgent(Bus& agent_bus);
 
   void Tick(int64_t now_utime) override;
@@ -50,12 +52,12 @@ class ViewerProcess : public Process, public Show {
   std::string source_;
   int64_t start_utime_;
   const Pages pages_;
-  int64_t now_utime_;  // of the last tick
+  int64_t now_utime_;  // time of the last tick
   Scene scene_;
   SceneEvents events_;
   ShowClock clock_;
   MissingMessages keyframes_;
-  std::set<MapId> results_requested_;  // maps whose verification results of before were asked for
+  std::set<MapId> results_requested_;  // maps whose earlier verification results were asked for
   AnchorRequests requests_;
   int64_t newest_anchor_utime_ = 0;
   int64_t next_status_utime_ = 0;

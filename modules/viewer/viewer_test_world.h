@@ -1,6 +1,6 @@
 #pragma once
 
-// A small world for the viewer's tests: agents on straight lines, one point a keyframe.
+// A small world for the viewer's tests: agents walk on straight lines, with one point per keyframe.
 
 #include "viewer/scene/scene.h"
 #include "viewer/show.h"
@@ -9,16 +9,16 @@ namespace pangea::viewer {
 
 // The first map of an agent.
 MapId TestMap(int32_t agent_id);
-// A metre further along x with each seq; one point two metres ahead.
+// Its x grows by one metre with each seq; it has one point two metres ahead.
 ShownKeyframe TestKeyframe(const MapId& map, int32_t seq);
-// All keyframes of the maps up to `highest_seq`, shifted to y = 10 times their place in the list.
+// All keyframes of the maps up to `highest_seq`, each map shifted to y = 10 times its index.
 MapState TestState(const std::vector<MapId>& maps, int32_t highest_seq, int64_t revision);
 Constraint TestConstraint(const KeyframeId& from, const KeyframeId& to, bool accepted);
 
-// "anchor N", N metres up from the origin of the group, which is `group`'s map.
+// "anchor N", N metres above the origin of the group.
 AnchorState TestAnchor(int64_t n, const MapId& group);
 
-// A show that a test moves by hand.
+// A show that a test controls.
 class TestShow : public Show {
  public:
   const Scene& scene() const override { return scene_; }

@@ -1,5 +1,5 @@
-// The phone's agent as a native program: what an image takes, for comparison with
-// pangea-agent.mjs, which prints the same.
+// Runs the phone's agent as a native program and prints the time per image, as pangea-agent.mjs
+// does, for comparison.
 
 #include <fmt/format.h>
 
@@ -14,7 +14,7 @@
 namespace pangea::phone {
 namespace {
 
-constexpr int64_t kAhead_us = 60'000;  // samples go before their image, past its last row
+constexpr int64_t kAhead_us = 60'000;  // samples are added this far ahead: past an image's last row
 
 double CpuMs() { return 1e3 * static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 

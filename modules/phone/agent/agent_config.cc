@@ -15,7 +15,7 @@ namespace pangea::phone {
 namespace {
 
 constexpr double kMaxAgent = 65535;
-constexpr double kMaxUtime = 9e15;  // a double counts to here
+constexpr double kMaxUtime = 9e15;  // a double represents all integers up to here
 
 int64_t WholeNumber(const char* field, double value, double max) {
   if (!(value >= 1 && value <= max) || value != std::floor(value)) {

@@ -1,5 +1,5 @@
-// PhoneAgent and CameraCalibration for JavaScript. Their other side, with the types, is
-// page/src/agent/.
+// Exports PhoneAgent and CameraCalibration to JavaScript. The JavaScript side, with the types, is
+// in page/src/agent/.
 
 #include <emscripten/bind.h>
 #include <emscripten/heap.h>
@@ -157,7 +157,7 @@ val ToObject(const PhoneEvents& events) {
   return object;
 }
 
-// What emscripten's classes are made of: methods of JavaScript's types.
+// PhoneAgent with methods that take and return JavaScript's types, for emscripten's class.
 class Agent {
  public:
   explicit Agent(const AgentConfig& config) : agent_(config) {}
@@ -215,7 +215,7 @@ class Agent {
   std::vector<uint8_t> image_;
 };
 
-// Exceptions of C++ do not say in JavaScript what they are.
+// Errors are returned as texts, because JavaScript cannot read C++ exceptions.
 val CreateAgent(const val& config) {
   val result = val::object();
   try {

@@ -1,7 +1,7 @@
 #pragma once
 
-// A phone's camera calibrated while somebody moves it: what the page shows, and what comes of it.
-// One thread, no clock; as PhoneAgent.
+// Calibrates a phone's camera while somebody moves the phone: the progress for the page, and the
+// result. No clock; not thread safe; used as PhoneAgent is.
 
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
@@ -13,31 +13,32 @@
 namespace pangea::phone {
 
 struct CalibrationProgress {
-  double share = 0;  // of what suffices, 0 to 1
-  // What is missing most: "rotation about x", "... y", "... z" (camera's axes, or the body's where
-  // the camera's are not known), "points", "time"; "" when nothing is.
+  double share = 0;  // share of the motion that suffices, 0 to 1
+  // What is missing most: "rotation about x", "... y", "... z" (the camera's axes, or the body's if
+  // the camera's are not known), "points", "time"; "" if nothing is.
   std::string missing;
 };
 
 class CameraCalibration {
  public:
-  // Older images count no more: a camera that was held still must not be carried along for ever.
+  // Older images are dropped, because images of a camera that was held still must not stay for
+  // ever.
   static constexpr int64_t kWindow_us = 60'000'000;
 
-  // `imu_yaml`: of mav0/imu0/sensor.yaml; throws std::runtime_error naming the field.
+  // `imu_yaml`: text of a mav0/imu0/sensor.yaml. Throws std::runtime_error with the field.
   CameraCalibration(int width, int height, const std::string& imu_yaml,
                     const std::optional<Eigen::Quaterniond>& q_body_cam);
 
   void AddImu(const ImuSample& sample) { collector_.AddImu(sample); }
-  // 8-bit grey, of that size.
+  // `image`: 8-bit grey, of the size given to the constructor.
   void AddImage(int64_t utime, const cv::Mat& image);
 
   CalibrationProgress progress() const;
-  // The text of mav0/cam0/sensor.yaml, with standard deviations; or why it is refused. Seconds of
-  // CPU.
+  // Returns the text of a mav0/cam0/sensor.yaml with standard deviations, or why there is none.
+  // Takes seconds of CPU time.
   struct Outcome {
     std::string camera_yaml;
-    std::string refused;  // empty: it holds
+    std::string refused;  // empty: the calibration is good
   };
   Outcome Solve() const;
 

@@ -1,7 +1,7 @@
 #pragma once
 
-// The agent's anchors as an app draws them: what they are (ANCHOR_k), and where they are shown now
-// (SHOWN_ANCHORS_k).
+// The agent's anchors as an app draws them: their names and payloads from ANCHOR_k, and their
+// current poses from SHOWN_ANCHORS_k.
 
 #include <map>
 #include <optional>
@@ -17,19 +17,19 @@ struct DrawnAnchor {
   std::string name;
   std::string payload;
   Rigid3 T_odom_anchor;
-  double sigma_m = 0;  // of the position, along its least certain direction
+  double sigma_m = 0;  // standard deviation of the position along its least certain direction
   int64_t revision = 0;
 };
 
 class DrawnAnchors {
  public:
   void Take(const AnchorState& state);
-  // Those of them that are to be drawn.
+  // The anchors of `shown` whose state is known.
   std::vector<DrawnAnchor> Draw(const ShownAnchors& shown) const;
   const AnchorState* Find(const AnchorId& id) const;
 
  private:
-  std::map<AnchorId, AnchorState> states_;  // as many as the uplink keeps
+  std::map<AnchorId, AnchorState> states_;  // bounded by the uplink
 };
 
 }  // namespace pangea::phone

@@ -1,7 +1,8 @@
 #pragma once
 
-// What makes poses and keyframes of a phone's sensors, on the agent's bus: our own odometry from
-// images and inertial samples, or the device's own, which gives each image with its pose.
+// Makes poses and keyframes from a phone's sensors, on the agent's bus: either with our own
+// odometry from images and inertial samples, or with the device's odometry, which gives a pose with
+// each image.
 
 #include <cstdint>
 #include <memory>
@@ -18,12 +19,12 @@ class Odometry {
  public:
   virtual ~Odometry() = default;
   virtual void AddImu(const ImuSample& sample) = 0;
-  // `T_odom_body`: the device's pose, z up; nothing while it is lost, and for our own odometry.
+  // `T_odom_body`: the device's pose, z up; nothing while it is lost. Our own odometry ignores it.
   virtual void AddImage(int64_t utime, const cv::Mat& image,
                         const std::optional<Rigid3>& T_odom_body) = 0;
-  // The sensors' time begins anew.
+  // The sensors' time starts again: the next image opens a new map.
   virtual void StartAnew() = 0;
-  // No more images.
+  // No more images come: finishes the keyframes in the window.
   virtual void Flush() = 0;
   virtual void Tick(int64_t now_utime) = 0;
   virtual Node& node() = 0;

@@ -44,7 +44,7 @@ void PhoneAgent::Listen() {
   node_.Subscribe<pose_t>(channels::Pose(agent_id_),
                           [this](const std::string&, const pose_t& message) { OnPose(message); });
   node_.Listen<correction_t>(channels::Correction(agent_id_), [this](const Correction& correction) {
-    // Maps of earlier runs are corrected too.
+    // Corrections of maps of earlier runs come too. The newest map's is kept.
     if (!correction_ || correction_->map < correction.map ||
         (correction_->map == correction.map && correction_->revision < correction.revision)) {
       correction_ = correction;
@@ -81,7 +81,7 @@ void PhoneAgent::OnLinkDown(Bytes packet) {
   link_bus_.Drain();
 }
 
-// The uplink takes it as if the odometry had just finished it.
+// The keyframe is published as if the odometry had just finished it, so the uplink takes it.
 void PhoneAgent::Restore(const std::string& id, Bytes bytes) {
   const std::optional<KeyframeId> keyframe = IdOf(bytes);
   if (!keyframe) {

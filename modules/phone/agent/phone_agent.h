@@ -1,13 +1,13 @@
 #pragma once
 
-// A phone's agent whole: odometry and uplink on two buses inside it. Who owns it has the sensors,
-// the clock, the network and the storage, and hands over what they give. The same class runs in a
-// browser, in Node and in tests.
+// A complete agent for a phone: odometry and uplink on two internal buses. Its owner has the
+// sensors, the clock, the network and the storage, and passes their data in. The same class runs in
+// a browser, in Node and in tests.
 //
 //   images, inertial samples, packets from the server ─► PhoneAgent ─► PhoneEvents
 //
-// No thread, clock, socket or file. Times: microseconds; `utime` of the sensors' clock, `now_us`
-// since 1970 and never stepping (bus/wall_clock.h).
+// No thread, clock, socket or file; not thread safe. Times are microseconds: `utime` by the
+// sensors' clock, `now_us` since 1970, without steps (bus/wall_clock.h).
 
 #include <cstdint>
 #include <map>
@@ -33,12 +33,12 @@ namespace pangea::phone {
 
 struct PhonePose {
   int64_t utime = 0;  // of the image
-  int8_t state = 0;   // pose_t's
+  int8_t state = 0;   // pose_t.STATE_*
   std::string reason;
   MapId map;
   Rigid3 T_odom_body;
   int num_tracked = 0;
-  // Since the server's first correction of this map.
+  // Set once the server has corrected this map.
   struct InGroup {
     MapId group;  // its odom frame is the map frame
     Rigid3 T_map_body;
@@ -46,24 +46,25 @@ struct PhonePose {
   std::optional<InGroup> in_group;
 };
 
-// A keyframe to keep in storage until it is acknowledged, or not any more.
+// A keyframe that the owner must store until it is acknowledged, or may now delete.
 struct SpoolChange {
   std::string id;
   std::vector<uint8_t> bytes;  // empty: delete
 };
 
-// What has come out; as pose, statuses, anchors and others the newest alone.
+// The output since the last Take. Of poses, statuses, anchors and others only the newest is kept.
 struct PhoneEvents {
-  std::vector<std::vector<uint8_t>> link_up;  // sealed packets, in their order
+  std::vector<std::vector<uint8_t>> link_up;  // sealed packets, in order
   std::optional<PhonePose> pose;
-  std::optional<status_t> vio_status, uplink_status;  // vio: of either odometry
+  std::optional<status_t> vio_status, uplink_status;  // vio_status: of either odometry
   std::optional<std::vector<DrawnAnchor>> anchors;
   std::optional<Others> others;
   std::vector<SpoolChange> spool;
-  std::vector<std::vector<uint8_t>> keyframes;  // encoded keyframe_t, as they are finished
+  std::vector<std::vector<uint8_t>> keyframes;  // encoded keyframe_t, newly finished
 };
 
-// A new anchor, at a pixel of the image of `utime`, or in the body at that time.
+// A new anchor: on the surface behind a pixel of the image of `utime`, or relative to the body
+// then.
 struct NewAnchor {
   std::string name;
   std::string payload;
@@ -77,22 +78,22 @@ class PhoneAgent {
   explicit PhoneAgent(const AgentConfig& config);
 
   void AddImu(const ImuSample& sample) { odometry_->AddImu(sample); }
-  // 8-bit grey, of the calibration's size; copied. `T_odom_body`: as of Odometry.
+  // `image`: 8-bit grey, of the calibration's size; it is copied. `T_odom_body`: see Odometry.
   void AddImage(int64_t utime, const cv::Mat& image,
                 const std::optional<Rigid3>& T_odom_body = std::nullopt);
   void OnLinkDown(Bytes packet);
-  // A keyframe that an earlier run has put in its spool; before the first image, in their order.
-  // One that is damaged is deleted.
+  // Gives back a keyframe that an earlier run stored. Call it before the first image, in the order
+  // in which they were stored. A damaged keyframe is deleted (PhoneEvents::spool).
   void Restore(const std::string& id, Bytes bytes);
-  // Throws std::runtime_error: it does not track, a field is out of its bounds.
+  // Throws std::runtime_error if the odometry does not track or a field is out of bounds.
   AnchorId PlaceAnchor(const NewAnchor& anchor);
-  // Nothing when there is no such anchor.
+  // Does nothing if there is no such anchor.
   void RemoveAnchor(const AnchorId& id);
-  // Every 10 to 20 ms.
+  // Call it every 10 to 20 ms.
   void Poll(int64_t now_us);
-  // The sensors' time begins anew.
+  // The sensors' time starts again: finishes the map; the next image opens another.
   void StartAnew();
-  // No more images.
+  // No more images come: finishes the keyframes in the window.
   void Flush();
 
   PhoneEvents Take();
@@ -109,14 +110,14 @@ class PhoneAgent {
   LocalBus link_bus_;
   Node node_;
   const std::unique_ptr<Odometry> odometry_;
-  std::optional<UplinkProcess> uplink_;  // none without a key
+  std::optional<UplinkProcess> uplink_;  // only with a key
   DrawnAnchors anchors_;
   std::optional<Correction> correction_;  // the newest one of the newest map
-  std::optional<MapId> tracked_map_;      // while it tracks
+  std::optional<MapId> tracked_map_;      // set while the odometry tracks
   std::set<KeyframeId> spooled_;
   int64_t now_us_ = 0;
   int64_t next_tick_us_ = 0;
-  int64_t last_created_utime_ = 0;  // of an anchor
+  int64_t last_created_utime_ = 0;  // of the newest anchor made here
   PhoneEvents events_;
 };
 

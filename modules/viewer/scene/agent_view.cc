@@ -8,7 +8,7 @@ void AgentView::Take(ShownCorners corners) {
   const bool other_map = !corners_.empty() && corners_.front().map != corners.map;
   if (!corners_.empty() &&
       (other_map ? corners.map < corners_.front().map : corners.seq <= corners_.front().seq)) {
-    return;  // asked for again, or of a map that is over
+    return;  // an old keyframe that was sent again, or one of an earlier map
   }
   if (other_map) {
     corners_.clear();

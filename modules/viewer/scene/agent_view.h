@@ -1,8 +1,8 @@
 #pragma once
 
-// What an agent's camera saw at its newest keyframe: the corners it tracks, with their way through
-// the keyframes before, and the image where the agent publishes images. A keyframe comes seconds
-// after its image, so images wait here for theirs; bounded, the oldest go first.
+// The view of an agent's camera at its newest keyframe: the tracked corners, with their pixels in
+// the keyframes before, and the image if the agent publishes images. A keyframe comes seconds after
+// its image, so images wait here for their keyframe; bounded, the oldest are dropped first.
 
 #include <cstdint>
 #include <deque>
@@ -25,14 +25,14 @@ struct ShownImage {
   std::vector<uint8_t> bytes;
 };
 
-// Corners of one keyframe that are tracked landmarks.
+// The corners of one keyframe that are tracked landmarks.
 struct ShownCorners {
   MapId map;
   int32_t seq = 0;
   int64_t utime = 0;
   int width = 0;  // of the image, pixels
   int height = 0;
-  std::map<int32_t, Eigen::Vector2f> pixels;  // by landmark
+  std::map<int32_t, Eigen::Vector2f> pixels;  // raw, by landmark id
 };
 
 class AgentView {
@@ -40,19 +40,19 @@ class AgentView {
   static constexpr size_t kMaxImages = 300;
   static constexpr size_t kMaxImageBytes = 30'000'000;
   static constexpr size_t kTrail = 8;  // keyframes
-  // A keyframe's time is its image's, but for the read-out of a rolling shutter.
+  // A keyframe's time may differ from its image's by the read-out of a rolling shutter.
   static constexpr int64_t kSameTime_us = 40'000;
 
   void Take(ShownCorners corners);
   void Take(std::shared_ptr<const ShownImage> image);
 
-  // Another number: something else is to be seen; 0: nothing yet.
+  // A number that changes whenever the view changes; 0: there is nothing to see yet.
   int64_t number() const { return number_; }
   int width() const { return width_; }
   int height() const { return height_; }
-  // Each track's pixels, newest first.
+  // The pixels of each track, newest first.
   std::vector<std::vector<Eigen::Vector2f>> Tracks() const;
-  // Of the newest keyframe, or the newest at all while there is no keyframe; may be null.
+  // The image of the newest keyframe, or the newest image while there is no keyframe; may be null.
   const std::shared_ptr<const ShownImage>& image() const { return image_; }
 
  private:

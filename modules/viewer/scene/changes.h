@@ -1,8 +1,8 @@
 #pragma once
 
-// Which items of a scene changed, in order: what a page that has seen everything up to a version
-// lacks is what comes after it. An item that changes again moves to the end, so a slow page is told
-// the newest state once and nothing piles up for it.
+// The items of a scene in the order in which they last changed. A page that has seen everything up
+// to a version lacks exactly the items after it. An item that changes again moves to the end; so a
+// slow page gets only the newest state, and nothing accumulates for it.
 
 #include <compare>
 #include <cstdint>
@@ -24,7 +24,7 @@ enum class ItemKind : uint8_t {
 
 struct Item {
   ItemKind kind = ItemKind::kMap;
-  int64_t index = 0;  // in the scene's list of that kind; an agent's is its id
+  int64_t index = 0;  // in the scene's list of this kind; for an agent, its id
   auto operator<=>(const Item&) const = default;
 };
 
@@ -37,7 +37,7 @@ class Changes {
     by_version_[version] = item;
   }
 
-  // Of the newest change; 0 while there is none.
+  // The version of the newest change; 0 while there is none.
   uint64_t version() const { return version_; }
   const std::map<uint64_t, Item>& by_version() const { return by_version_; }
 

@@ -5,7 +5,7 @@
 namespace pangea::viewer {
 namespace {
 
-// A solve that moves a keyframe by less than both is not worth telling a page.
+// If an optimisation moves a keyframe by less than both values, pages are not told.
 constexpr double kLeastMove_m = 5e-4;
 constexpr double kLeastRotation_rad = 5e-4;
 
@@ -13,7 +13,7 @@ bool Moved(const Rigid3& from, const Rigid3& to) {
   return (from.t - to.t).norm() > kLeastMove_m || from.q.angularDistance(to.q) > kLeastRotation_rad;
 }
 
-// The index of `key`, given a new one by `append` if there are fewer than `limit`; else -1.
+// The index of `key`. A new key is added by `append` if there are fewer than `limit`; else -1.
 template <typename Key, typename Append>
 int IndexOf(std::map<Key, int>* index, const Key& key, size_t limit, const Append& append) {
   const auto known = index->find(key);
@@ -90,8 +90,8 @@ void Scene::WorksIn(SceneAgent& agent, int map, const Rigid3& T_odom_body) {
   }
 }
 
-// A landmark is one point, and stays with the keyframe that told it first: drawn once for each
-// keyframe that saw it, it would be a smear along the views.
+// Each landmark is drawn once, at the keyframe that had it first. Drawn for each keyframe that saw
+// it, it would be smeared along the viewing rays.
 void Scene::AddPoints(SceneKeyframe& keyframe) {
   std::vector<ShownPoint>& points = keyframe.shown.points;
   std::unordered_set<int32_t>& landmarks = maps_[static_cast<size_t>(keyframe.map)].landmarks;
@@ -251,7 +251,7 @@ void Scene::Take(const ProcessHealth& health) {
 }
 
 void Scene::Take(const AnchorState& anchor) {
-  // One that is gone before it was seen needs no room.
+  // An anchor that is gone before it was ever shown is not added.
   if ((anchor.gone && !anchor_index_.contains(anchor.anchor)) || MapOf(anchor.map) < 0) {
     return;
   }

@@ -1,11 +1,11 @@
 #pragma once
 
-// What is there to see: maps, keyframes with their points, solved poses, verification results,
-// agents, the health of processes, fusions, anchors. Domain messages in, in any order and repeated
-// as they like; state and the order in which it changed out. Knows no page, no socket and no clock:
-// the time is told.
+// Everything that is shown: maps, keyframes with their points, optimised poses, verification
+// results, agents, the state of processes, fusions, anchors. In: domain messages in any order, with
+// repeats. Out: the state, and the order in which it changed. Knows no page, socket or clock;
+// SetTime gives the time. Not thread safe.
 //
-// Bounded (kMax...): what comes beyond is not shown, and counted.
+// Bounded (kMax...): what is beyond a bound is not shown, but counted.
 
 #include <cstdint>
 #include <map>
@@ -32,13 +32,13 @@ struct ShownPoint {
   int32_t landmark_id = kNoLandmark;
 };
 
-// The part of a keyframe that is drawn.
+// The parts of a keyframe that are drawn.
 struct ShownKeyframe {
   KeyframeId id;
   int64_t utime = 0;  // sensor clock
   Rigid3 T_odom_body;
   Rigid3 T_body_cam;
-  // The image's edges on the camera's plane z = 1: left, top, right, bottom.
+  // Edges of the image on the plane z = 1 of the camera frame: left, top, right, bottom.
   Eigen::Vector4d view = Eigen::Vector4d::Zero();
   std::vector<ShownPoint> points;
   ShownCorners corners;
@@ -72,19 +72,21 @@ struct ProcessHealth {
 
 struct SceneMap {
   MapId id;
-  MapId group;           // its own id while it is alone
-  int64_t revision = 0;  // of what told the group
-  Rigid3 T_map_odom;     // for keyframes that are not solved
+  MapId group;           // its own id while it is not fused
+  int64_t revision = 0;  // of the message that gave the group
+  Rigid3 T_map_odom;     // for keyframes without an optimised pose
   int num_keyframes = 0;
-  std::unordered_set<int32_t> landmarks;  // of the keyframes' points
+  std::unordered_set<int32_t> landmarks;  // landmarks of the points that are drawn
   Drift drift;
 };
 
 struct SceneKeyframe {
   ShownKeyframe shown;
-  bool arrived = false;  // a solved pose may come first; of its points, those no other has
-  int map = 0;           // index into maps()
-  // Solved, in the odom frame of `group`.
+  // False if only the optimised pose has come. `shown` has only the points that no other keyframe
+  // has.
+  bool arrived = false;
+  int map = 0;  // index into maps()
+  // The optimised pose, in the odom frame of `group`.
   std::optional<Rigid3> T_map_body;
   MapId group;
   int64_t revision = 0;
@@ -92,9 +94,9 @@ struct SceneKeyframe {
 
 struct SceneAgent {
   int32_t id = 0;
-  int map = -1;  // the map it works in; -1: none yet
+  int map = -1;  // index of the map it works in; -1: none yet
   std::optional<ShownPose> pose;
-  Rigid3 T_odom_body;  // newest pose, or newest keyframe's where no poses are published
+  Rigid3 T_odom_body;  // newest pose, or that of the newest keyframe if no poses are published
   Rigid3 T_body_cam;
   Eigen::Vector4d view = Eigen::Vector4d::Zero();
   AgentView camera;
@@ -106,20 +108,20 @@ struct SceneProcess {
   double heard_s = 0;
 };
 
-// Maps became one group, or were taken apart again.
+// Maps were fused into one group, or separated again.
 struct Fusion {
   double time_s = 0;
   bool fused = true;
   std::vector<MapId> maps;
 };
 
-// A line for people; only the newest is kept.
+// A line of text for people; only the newest one is kept.
 struct Notice {
   double time_s = 0;
   std::string text;
 };
 
-// Whether a state shows anything that the one before it did not.
+// Whether `after` differs visibly from `before`.
 bool ShowsMore(const AnchorState& before, const AnchorState& after);
 
 class Scene {
@@ -131,9 +133,9 @@ class Scene {
   static constexpr size_t kMaxConstraints = 50'000;
   static constexpr size_t kMaxProcesses = 200;
   static constexpr size_t kMaxFusions = 1000;
-  static constexpr size_t kMaxAnchors = 10'000;  // those that were deleted while it looked count
+  static constexpr size_t kMaxAnchors = 10'000;  // including those that were deleted meanwhile
 
-  // Seconds since the start of what is shown; what comes after happened then.
+  // Seconds since the start of the show. The messages that follow count as of this time.
   void SetTime(double time_s) { time_s_ = time_s; }
 
   void Take(const ShownKeyframe& keyframe);
@@ -143,7 +145,8 @@ class Scene {
   void Take(const Correction& correction);
   void Take(const MapState& state);
   void Take(const ProcessHealth& health);
-  // In its group's frame, as on ANCHOR. One that was deleted stays in the list, gone.
+  // `anchor`: in its group's frame, as on channel ANCHOR. A deleted anchor stays in the list as
+  // gone.
   void Take(const AnchorState& anchor);
   void Tell(const std::string& notice);
 
@@ -156,24 +159,24 @@ class Scene {
   const std::vector<SceneProcess>& processes() const { return processes_; }
   const std::vector<Fusion>& fusions() const { return fusions_; }
   const std::vector<AnchorState>& anchors() const { return anchors_; }
-  const AnchorState* FindAnchor(const AnchorId& id) const;  // null: none, or gone
+  const AnchorState* FindAnchor(const AnchorId& id) const;  // null: unknown or gone
   const Notice& notice() const { return notice_; }
   std::optional<int> MapIndex(const MapId& id) const;
   int64_t num_left_out() const { return num_left_out_; }
 
-  // Where a keyframe is in its group's frame: as solved, or by its map's odometry.
+  // The pose of a keyframe in its group's frame: optimised, or by its map's odometry.
   Rigid3 T_map_body(const SceneKeyframe& keyframe) const;
 
-  // How far the agent has been moved by corrections since its map joined its group, metres.
+  // Metres by which corrections have moved the agent since its map joined its group.
   double DriftOf(const SceneAgent& agent) const;
   // Covariance of the agent's position in the map frame, m^2; nothing before its first correction.
   std::optional<Eigen::Matrix3d> PositionCovariance(const SceneAgent& agent) const;
 
  private:
-  // Indices; -1 where a bound is reached.
+  // Return an index; -1 if a bound is reached.
   int MapOf(const MapId& id);
   int KeyframeOf(const KeyframeId& id);
-  SceneAgent* AgentOf(int32_t id);  // null where the bound is reached
+  SceneAgent* AgentOf(int32_t id);  // null if the bound is reached
   void AddPoints(SceneKeyframe& keyframe);
   void WorksIn(SceneAgent& agent, int map, const Rigid3& T_odom_body);
   void Place(const KeyframePose& pose, const MapState& state);

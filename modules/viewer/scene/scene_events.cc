@@ -14,14 +14,14 @@ namespace {
 
 using Outcome = SceneEvents::Outcome;
 
-// A point whose depth is less certain than this says little about where anything is.
+// Points with a larger relative standard deviation of the depth are not drawn.
 constexpr double kMaxRelativeSigma = 0.1;
 constexpr size_t kMaxText = 500;
 
 std::string Bounded(const std::string& text) { return text.substr(0, kMaxText); }
 
-// Rays through the middles of the image's edges; a lens that cannot be inverted there keeps what a
-// pinhole would show.
+// Rays through the middles of the image's edges; if the lens model has no inverse there, those of a
+// pinhole camera.
 Eigen::Vector4d ViewOf(const CameraModel& camera) {
   const auto at = [&](double u, double v) {
     return camera.Unproject({u, v}).value_or(
@@ -62,7 +62,7 @@ ShownKeyframe Shown(const Keyframe& keyframe) {
   return shown;
 }
 
-// Empty for what is none.
+// Empty for an invalid state.
 std::string StateName(int8_t state) {
   switch (state) {
     case pose_t::STATE_INITIALISING:
@@ -117,7 +117,8 @@ Outcome FromStatus(const status_t& message) {
   return {health, ""};
 }
 
-// Decodes, converts by `convert` (message -> Outcome), or says what does not decode.
+// Decodes the message and converts it with `convert` (message -> Outcome); else the outcome says
+// what does not decode.
 template <typename Message, typename Convert>
 Outcome Decoded(Bytes data, const Convert& convert) {
   Message message{};
@@ -174,7 +175,7 @@ Outcome SceneEvents::FromMapState(Bytes data) {
   });
 }
 
-// A message sent again to whoever missed it is as good as the first.
+// A retransmitted message is parsed as the original would be.
 Outcome SceneEvents::FromRetransmission(Bytes data) {
   return Decoded<again_t>(data, [this](const again_t& message) {
     const bool nested = message.channel.starts_with(channels::kAgainPrefix);

@@ -1,6 +1,6 @@
 #pragma once
 
-// The border: what comes on a bus or out of a log becomes what a Scene takes, or is refused with a
+// Messages from a bus or a log are parsed to the events that a Scene takes, or refused with a
 // reason.
 
 #include <memory>
@@ -21,11 +21,12 @@ using SceneEvent = std::variant<ShownKeyframe, ShownPose, std::shared_ptr<const 
 class SceneEvents {
  public:
   struct Outcome {
-    // Also none for a chunk of a state or an image that is not whole yet.
+    // Nothing also for a chunk of a state or an image of which other chunks are missing.
     std::optional<SceneEvent> event;
     std::string refused;
   };
-  // By the channel's name; what is not shown is neither an event nor refused.
+  // The channel's name decides the type. Messages that are not shown give neither an event nor a
+  // reason.
   Outcome Parse(const std::string& channel, Bytes data);
 
  private:

@@ -15,10 +15,10 @@ using nlohmann::json;
 static_assert(std::endian::native == std::endian::little);
 
 constexpr double kTimeStep_s = 0.1;
-// About what an item of the JSON text takes.
+// Approximate size of an item in the JSON text, bytes.
 constexpr size_t kItemBytes = 200;
 
-// Numbers on the page need no 17 digits.
+// Rounds to four decimals, because the page does not need 17 digits.
 double Rounded(double value) { return std::round(value * 1e4) / 1e4; }
 
 json PoseJson(const Rigid3& T) {
@@ -116,7 +116,7 @@ class Update {
     }
   }
 
-  // Bytes, about.
+  // The approximate size, bytes.
   size_t size() const { return keyframes_.size() + solved_.size() + kItemBytes * num_items_; }
 
   void AddClock(bool first) {
@@ -143,7 +143,7 @@ class Update {
     json_["version"] = seen.version;
     json_["keyframes"] = num_keyframes_;
     json_["solved"] = num_solved_;
-    // What a log or a bus says is not always UTF-8.
+    // Texts from a log or a bus are not always valid UTF-8.
     std::string text = json_.dump(-1, ' ', false, json::error_handler_t::replace);
     text.resize((text.size() + 3) / 4 * 4, ' ');
     Records whole;
@@ -251,7 +251,7 @@ class Update {
                  {"id", {anchor.anchor.agent_id, anchor.anchor.created_utime}},
                  {"gone", anchor.gone}};
     if (!anchor.gone) {
-      // Of the position, root mean square over its axes.
+      // Standard deviation of the position, root mean square over its axes.
       const double sigma_m = std::sqrt(anchor.covariance.topLeftCorner<3, 3>().trace() / 3);
       said.update({{"name", anchor.name},
                    {"revision", anchor.revision},
@@ -285,7 +285,7 @@ class Update {
   int num_solved_ = 0;
 };
 
-// The watched agent, if its camera saw something that the page has not.
+// The watched agent, if its camera view is new to the page; else null.
 const SceneAgent* NewView(const Show& show, const Seen& seen) {
   const auto watched = show.scene().agents().find(seen.watched);
   const bool is_new =

@@ -10,13 +10,13 @@ namespace {
 using nlohmann::json;
 
 constexpr uint64_t kMaxAgent = 65535;
-constexpr uint64_t kMaxUtime = 1ULL << 53;  // a page has no larger integers
+constexpr uint64_t kMaxUtime = 1ULL << 53;  // JavaScript has no larger exact integers
 
 bool IsNumberBelow(const json& value, uint64_t end) {
   return value.is_number_unsigned() && value.get<uint64_t>() < end;
 }
 
-// Printable, as messages ask of a name, and not empty.
+// A name must be printable, as in messages, and not empty.
 bool TakeName(const json& value, AnchorChange* change) {
   if (!value.is_string()) {
     return false;

@@ -1,6 +1,6 @@
 #pragma once
 
-// What a page says of anchors (page_link.h), as a change.
+// Parses a page's messages about anchors (page_link.h).
 
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
@@ -10,10 +10,10 @@
 
 namespace pangea::viewer {
 
-// Metres from a keyframe that a place may be at most.
+// Largest coordinate of a position relative to its keyframe.
 inline constexpr double kMaxAnchorDistance_m = 10'000;
 
-// Nothing unless every field is there, is of its type and within its bounds, and no other is.
+// Nothing unless exactly the required fields are there, with the right types and within bounds.
 std::optional<AnchorChange> ParseAnchorChange(const std::string& key, const nlohmann::json& value);
 
 }  // namespace pangea::viewer

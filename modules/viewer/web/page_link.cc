@@ -8,7 +8,7 @@
 namespace pangea::viewer {
 namespace {
 
-// Of records in one update: what a phone takes in within a frame or two.
+// Bytes of records in one update: a phone can process them within one or two frames.
 constexpr size_t kBudget = 300'000;
 constexpr uint64_t kMaxWatchedAgent = 100'000;
 

@@ -1,8 +1,8 @@
 #pragma once
 
-// One page's end of the conversation, without its socket. A page is sent an update, says when it
-// has taken it in, and is sent the next: never more than one is under way, so a slow browser falls
-// behind in time, not in memory, and then sees the newest state.
+// The server's end of the connection to one page, without the socket. The page gets an update,
+// confirms it, and gets the next one. At most one update is under way, so a slow browser does not
+// use more memory, but only gets the newest state later.
 
 #include <cstdint>
 #include <optional>
@@ -22,15 +22,15 @@ class PageLink : public web::WebPeer {
   explicit PageLink(Show& show) : show_(show) {}
 
   bool is_text() const override { return false; }
-  // Nothing while the last one is under way or when there is no update.
+  // The next update. Nothing while the last one is not confirmed, or when there is nothing new.
   std::optional<std::vector<uint8_t>> Next() override;
 
-  // {"taken": VERSION}, {"seek": SECONDS}, {"play": BOOL}, {"speed": FACTOR}, {"watch": AGENT};
-  // where the show is editable also {"anchor_add": {"name": NAME, "keyframe": INDEX, "p_body": [X,
-  // Y, Z]}},
-  // {"anchor_move": {"anchor": [AGENT, CREATED], "keyframe": INDEX, "p_body": [X, Y, Z]}} and
+  // Takes {"taken": VERSION}, {"seek": SECONDS}, {"play": BOOL}, {"speed": FACTOR}, {"watch":
+  // AGENT}; and if the show is editable:
+  // {"anchor_add": {"name": NAME, "keyframe": INDEX, "p_body": [X, Y, Z]}},
+  // {"anchor_move": {"anchor": [AGENT, CREATED], "keyframe": INDEX, "p_body": [X, Y, Z]}},
   // {"anchor_delete": {"anchor": [AGENT, CREATED]}}.
-  // False for anything else: no page of ours says it.
+  // False for anything else, which our pages never send.
   bool Receive(std::string_view text) override;
 
  private:

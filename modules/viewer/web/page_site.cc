@@ -7,7 +7,7 @@
 namespace pangea::viewer {
 namespace {
 
-// What a page may load and do; `host` is one that HostAllowed has let through.
+// The page's Content-Security-Policy; HostAllowed has accepted `host`.
 std::string PagePolicy(const std::string& host) {
   return fmt::format(
       "default-src 'self'; connect-src 'self' ws://{0} wss://{0}; img-src 'self' blob: data:; "

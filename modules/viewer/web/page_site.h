@@ -1,6 +1,6 @@
 #pragma once
 
-// The page, and the conversation with each browser that shows it, as a site.
+// The web site of the viewer: the page, and the connection to each browser that shows it.
 
 #include "viewer/show.h"
 #include "web/page_files.h"
@@ -10,7 +10,7 @@ namespace pangea::viewer {
 
 class PageSite : public web::WebSite {
  public:
-  // `show` outlives it.
+  // `show` must outlive the site.
   PageSite(web::Page page, Show& show) : page_(std::move(page)), show_(show) {}
 
   void Answer(const web::WebRequest& request, Reply reply) override;
