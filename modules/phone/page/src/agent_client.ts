@@ -1,4 +1,4 @@
-// The page's side of the worker: sensors go in, what the agent says comes out.
+// The page's side of the worker that runs the agent: sensor data go in, the agent's messages come out.
 
 import type { Pose7 } from "./agent/phone_agent";
 import type { CameraImage } from "./sensors/camera";
@@ -6,7 +6,7 @@ import { packImu } from "./messages";
 import type { FromWorker, OpenAgent, ToWorker } from "./messages";
 import type { ImuSample } from "./recording/euroc";
 
-const kLongestClose_ms = 3000; // of an agent that answers no more
+const kLongestClose_ms = 3000; // longest wait for an agent that no longer answers
 
 type Image = Pick<CameraImage, "utime" | "luma" | "width" | "height" | "stride"> & { T_odom_body?: Pose7 | null };
 
@@ -26,7 +26,7 @@ export class AgentClient {
     this.say({ kind: "imu", samples: values }, [values.buffer]);
   }
 
-  // The image's luma is the worker's afterwards.
+  // Transfers the image's luma to the worker; it cannot be used here afterwards.
   addImage({ utime, luma, width, height, stride, T_odom_body }: Image) {
     this.say({ kind: "image", utime, luma, width, height, stride, T_odom_body }, [luma.buffer]);
   }
@@ -35,7 +35,7 @@ export class AgentClient {
     this.worker.postMessage(message, transfer);
   }
 
-  // Resolves when all that is unsent is stored.
+  // Resolves when all unsent keyframes are stored.
   async close(): Promise<void> {
     const closed = new Promise<void>((done) => (this.closed = done));
     this.say({ kind: "close" });

@@ -4,7 +4,7 @@ export function byId<E extends HTMLElement = HTMLElement>(id: string): E {
   return element as E;
 }
 
-// The value of the button that closed it.
+// Opens a dialog; resolves to the value of the button that closed it.
 export async function askDialog(id: string): Promise<string> {
   const dialog = byId<HTMLDialogElement>(id);
   dialog.returnValue = "cancel";

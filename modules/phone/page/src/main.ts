@@ -1,4 +1,4 @@
-// Joins the parts of the page: the visit, what is shown of it, and what the visitor taps, opens and drops.
+// Connects the parts of the page: the visit, its display, and the visitor's taps, buttons and dropped files.
 
 import "./style.css";
 import { agentColour, colours } from "../../../web/page/palette";
@@ -103,10 +103,10 @@ async function openDrop(items: DataTransferItemList) {
 document.addEventListener("visibilitychange", () => {
   if (panels.shown) visit.onVisibility(document.hidden);
 });
-// Images stand otherwise in the device from now on: another camera, for the odometry.
+// A rotated screen rotates the images in the device; for the odometry this is another camera.
 screen.orientation?.addEventListener("change", () => {
   if (visit.isLive && !visit.usesXr && panels.shown) attempt(visit.startLive());
 });
 
-// For tests and the curious.
+// For tests and debugging.
 Object.assign(window, { pangea: { get walk() { return visit.walk; }, get calibration() { return visit.calibration; }, stage } });

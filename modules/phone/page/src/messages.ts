@@ -1,9 +1,9 @@
-// What the page and the worker that holds the agent say to each other. Times are microseconds.
+// The messages between the page and the worker that runs the agent. Times are microseconds.
 
 import type { AgentPose, AnchorEdit, Others, Pose7, ProcessStatus, ShownAnchor } from "./agent/phone_agent";
 import type { ImuSample } from "./recording/euroc";
 
-// Who this phone is at the server; from joining.
+// The phone's identity at the server, which it got by joining.
 export interface Membership {
   agent: number;
   key: string; // 64 hexadecimal digits
@@ -13,21 +13,21 @@ export interface Membership {
 
 export interface OpenAgent {
   kind: "open";
-  membership?: Membership; // without it the odometry runs alone
+  membership?: Membership; // without it only the odometry runs
   cameraYaml: string;
   imuYaml?: string;
   vioOptionsYaml?: string;
-  devicePoses?: boolean; // images have poses, in place of our odometry
+  devicePoses?: boolean; // images have poses of the device's odometry, which replaces ours
 }
 
 export type ToWorker =
   | OpenAgent
-  | { kind: "imu"; samples: Float64Array } // kImuStride values each: utime, gyro xyz, accel xyz
+  | { kind: "imu"; samples: Float64Array } // kImuStride values per sample: utime, gyro xyz, accel xyz
   | { kind: "image"; utime: number; luma: Uint8Array; width: number; height: number; stride: number; T_odom_body?: Pose7 | null }
   | { kind: "place"; edit: AnchorEdit }
   | { kind: "remove"; id: string }
-  | { kind: "end_map" } // the keyframes of the window are finished; what comes next is a new map
-  | { kind: "close" }; // ends the map; what the server does not have is stored for the next time
+  | { kind: "end_map" } // finishes the keyframes in the window; the next image opens a new map
+  | { kind: "close" }; // ends the map; keyframes that the server does not have are stored for the next time
 
 export const kImuStride = 7;
 
@@ -37,7 +37,7 @@ export function packImu(samples: ImuSample[]): Float64Array<ArrayBuffer> {
   return values;
 }
 
-// refused: the gateway does not, or no longer, know the agent's key. replaced: the same agent runs in another page.
+// refused: the gateway does not know the agent's key, or it was revoked. replaced: the same agent runs in another page.
 export type LinkState = "connecting" | "open" | "refused" | "replaced";
 
 export type FromWorker =
@@ -49,6 +49,6 @@ export type FromWorker =
   | { kind: "others"; told: Others }
   | { kind: "status"; vio?: ProcessStatus; uplink?: ProcessStatus; link?: LinkState }
   | { kind: "placed"; id: string }
-  | { kind: "refused"; text: string } // an anchor
+  | { kind: "refused"; text: string } // an anchor was refused
   | { kind: "storage_failed"; text: string }
   | { kind: "closed" };

@@ -14,7 +14,7 @@ test("goes evenly to where it was told last", () => {
   people.take(told(2), 1250);
   assert.equal(x(1250), 1);
   assert.equal(x(1375), 1.5);
-  people.take(told(3), 1375); // before it has arrived
+  people.take(told(3), 1375); // while it still moves
   assert.equal(x(1375), 1.5);
   assert.equal(x(1625), 3);
   assert.equal(x(2000), 3);

@@ -1,11 +1,11 @@
-// Where the other people of the group are shown: on their way from where each was shown to where the server has told it last.
+// The poses at which the other people of the group are shown. Each moves from its shown pose to the newest one from the server.
 
 import { Quaternion, Vector3 } from "three";
 import type { OtherAgent, Others, Pose7 } from "./agent/phone_agent";
 
 const kWay_ms = 250; // a little longer than the server's interval
 const kKept_ms = 2000;
-const kLongestWay_m = 2; // what is farther away was corrected, and did not walk there
+const kLongestWay_m = 2; // a longer way is a correction and not walking: it is jumped
 
 interface Known {
   from: Pose7;
@@ -27,7 +27,7 @@ export class OtherPeople {
     }
   }
 
-  // In the odom frame of `map`: nobody when the server speaks of another one.
+  // The others in the odom frame of `map`; none if the server's poses are for another map.
   in(map: string, now_ms: number): OtherAgent[] {
     if (map !== this.map) return [];
     return [...this.known].filter(([, known]) => isFresh(known, now_ms))

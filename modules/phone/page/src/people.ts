@@ -1,4 +1,4 @@
-// Who is who at this server, by the agents' ids; asked for again now and then, for those who come later.
+// The names of the server's agents by id. They are fetched again from time to time, for people who join later.
 
 const kRefresh_ms = 10_000;
 

@@ -1,4 +1,4 @@
-// One visit: an unknown camera is calibrated, then an agent walks, with the phone's sensors, the device's own odometry, or a recording.
+// One visit: first an unknown camera is calibrated; then an agent runs with the phone's sensors, the device's odometry or a recording.
 
 import type { AgentPose } from "./agent/phone_agent";
 import { CalibrationWalk } from "./calibration/calibration_walk";
@@ -17,21 +17,21 @@ import type { WalkEvents } from "./walk";
 import { XrOdometry } from "./xr/xr_odometry";
 
 export interface VisitEvents {
-  onEnter(): void; // a camera's image is shown from now on
+  onEnter(): void; // from now on a camera image is shown
   onLeave(): void;
   onPose(pose: AgentPose): void;
   onNotice(text: string): void;
 }
 
 export interface VisitOptions {
-  ownOdometry: boolean; // even where the device has one
+  ownOdometry: boolean; // use our odometry even if the device has one
   realTime: boolean; // of recordings
 }
 
 export class Visit {
   walk?: Walk;
   calibration?: CalibrationWalk;
-  skipCalibration?: () => void; // where the visitor may go on without
+  skipCalibration?: () => void; // set if the visitor may continue without calibration
   isLive = false;
   playedShare = 0; // of a recording
   private camera?: CameraKind; // the newest live one
@@ -41,7 +41,7 @@ export class Visit {
   private endCalibration = (_cameraYaml: string | undefined) => {};
   private readonly walkEvents: WalkEvents;
 
-  // `admit`: joins with the invite code, where one was given.
+  // `admit`: joins with the invite code, if one was given.
   constructor(
     private readonly stage: Stage,
     private readonly admit: () => Promise<Membership | undefined>,
@@ -57,11 +57,11 @@ export class Visit {
     return this.xr !== undefined;
   }
 
-  // Within a tap.
+  // Must be called within a tap.
   async startLive() {
     this.endCalibration(undefined);
     if (!this.xrFails && (await this.hasXr) && (await this.startXr())) return;
-    await askForMotion(); // first: iOS asks within the tap only
+    await askForMotion(); // before all else, because iOS asks only within the tap
     const membership = await this.begin(true);
     const sensor = await Camera.open();
     this.camera = sensor.kind;
@@ -93,14 +93,14 @@ export class Visit {
     this.events.onLeave();
   }
 
-  // The tab is hidden, or seen again.
+  // The tab was hidden or is visible again.
   onVisibility(isHidden: boolean) {
     if (!this.walk || !this.isLive) return;
     if (isHidden) this.walk.endMap();
     else void keepAwake();
   }
 
-  // A sensor.yaml of this phone's camera, as pangea-calibrate writes it.
+  // Stores a sensor.yaml of this phone's camera, as pangea-calibrate writes it.
   keepCalibration(yaml: string) {
     const { camera } = this;
     if (!camera) throw new Error("Start once, so that the camera is known; then drop its sensor.yaml again.");
@@ -119,7 +119,7 @@ export class Visit {
     return membership;
   }
 
-  // False: our odometry takes its place, for instance where a browser gives no images.
+  // False if it does not work, for instance if the browser gives no images; then our odometry is used.
   private async startXr(): Promise<boolean> {
     try {
       this.xr = await XrOdometry.open(this.stage.overlay.renderer, document.body);
@@ -162,7 +162,7 @@ export class Visit {
     return cameraYaml === undefined ? undefined : withCamera(recording, cameraYaml, "the calibration");
   }
 
-  // Nothing: it was ended without. `otherwise`: what the visitor may go on with at once.
+  // Undefined if it was ended without a result. `otherwise`: a calibration with which the visitor may continue at once.
   private async calibrate(run: CalibrationWalk, otherwise?: string): Promise<string | undefined> {
     this.calibration = run;
     this.skipCalibration = otherwise === undefined ? undefined : () => this.endCalibration(otherwise);

@@ -1,4 +1,4 @@
-// One agent while it walks: its sensors, live or played, its worker, and what is known of it. The page draws from here.
+// One walk of an agent: its sensors, live or played, its worker, and its newest state, which the page draws.
 
 import { AgentClient } from "./agent_client";
 import type { AgentPose, ProcessStatus, ShownAnchor } from "./agent/phone_agent";
@@ -33,15 +33,15 @@ export class Walk {
   uplink?: ProcessStatus;
   brightness = 255;
   motionSilent = false;
-  numImages = 0; // that the agent is done with
+  numImages = 0; // number of images that the agent has processed
   recorder?: Recorder;
   private stopSensors = () => {};
   private readonly client: AgentClient;
-  private taken = () => {}; // the image at the agent
+  private taken = () => {}; // called when the agent has processed its image
 
   private constructor(
     readonly camera: CameraModel,
-    private readonly yaml: { camera: string; imu?: string }, // no IMU: images have the device's poses
+    private readonly yaml: { camera: string; imu?: string }, // without imu: images have the device's poses
     readonly membership: Membership | undefined,
     private readonly stage: Stage,
     private readonly events: WalkEvents,
@@ -51,7 +51,7 @@ export class Walk {
     this.client = new AgentClient(open, (message) => this.take(message));
   }
 
-  // With the phone's own sensors; it stops the camera when it stops.
+  // A walk with the phone's own sensors. It stops the camera when it stops.
   static live(camera: Camera, cameraYaml: string, membership: Membership | undefined, stage: Stage, events: WalkEvents): Walk {
     const model = parseCamera(cameraYaml, "the stored calibration");
     const walk = new Walk(model, { camera: cameraYaml, imu: kPhoneImu }, membership, stage, events);
@@ -64,7 +64,7 @@ export class Walk {
     return walk;
   }
 
-  // With the device's own odometry, whose session goes on when it stops.
+  // A walk with the device's odometry. The device's session continues when the walk stops.
   static xr(device: XrOdometry, cameraYaml: string, membership: Membership | undefined, stage: Stage, events: WalkEvents): Walk {
     const walk = new Walk(parseCamera(cameraYaml, "the device's camera"), { camera: cameraYaml }, membership, stage, events);
     const images = new NewestFrame<XrImage>((image) => walk.giveToAgent(image), () => {});
@@ -75,7 +75,7 @@ export class Walk {
     return walk;
   }
 
-  // A recording in place of sensors; `onImage` is told the share that is played.
+  // A walk with a recording instead of sensors. `onImage` gets the share that was played.
   static play(
     recording: CalibratedRecording, realTime: boolean, membership: Membership | undefined, stage: Stage, events: WalkEvents,
     onImage: (share: number) => void,
@@ -104,12 +104,12 @@ export class Walk {
     this.client.say({ kind: "remove", id });
   }
 
-  // Sensors pause, or are at their end: the map ends cleanly, what comes afterwards is a new one.
+  // The sensors pause or end: the map ends cleanly, and later images open a new one.
   endMap() {
     this.client.say({ kind: "end_map" });
   }
 
-  // The agent lives on until close, to send what the server does not have yet.
+  // The agent runs on until close, to send the keyframes that the server does not have yet.
   stop() {
     this.stopSensors();
     this.endMap();
@@ -124,7 +124,7 @@ export class Walk {
     this.recorder = new Recorder(`walk_${new Date().toISOString().replace(/[:.]/g, "-")}`, this.yaml.camera, this.yaml.imu ?? kPhoneImu);
   }
 
-  // Keyframes that the server has not acknowledged.
+  // Number of keyframes that the server has not acknowledged.
   get numUnsent(): number {
     return this.uplink?.counters.pending ?? 0;
   }
@@ -152,7 +152,7 @@ export class Walk {
     this.client.addImage(image);
   }
 
-  // What lies over a camera image that the device shows itself: by the pose of this frame, taps by the agent's newest image.
+  // Draws the things over a camera image that the device shows itself, with the pose of this frame. Taps use the agent's newest image.
   private showThrough({ T_odom_body, target }: XrFrame) {
     if (!this.pose) return;
     const pose: AgentPose = { ...this.pose, T_odom_body };

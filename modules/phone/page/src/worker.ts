@@ -1,4 +1,4 @@
-// The agent in a Web Worker: odometry, uplink, the WebSocket to the gateway, and the store of keyframes that wait for it.
+// Runs the agent in a Web Worker: odometry, uplink, the WebSocket to the gateway, and the store of keyframes that wait for the server.
 
 import { PhoneAgent } from "./agent/phone_agent";
 import type { AgentEvents, AnchorEdit, WasmModuleFactory } from "./agent/phone_agent";
@@ -8,8 +8,8 @@ import { kImuStride } from "./messages";
 import type { FromWorker, OpenAgent, ToWorker } from "./messages";
 
 const kPoll_ms = 10;
-const kModule = "/pangea_agent.mjs"; // lies beside the page
-const kAlone = 1; // the id of an agent without a membership: nobody hears it
+const kModule = "/pangea_agent.mjs"; // beside the page
+const kAlone = 1; // id of an agent without membership, which nobody else sees
 
 const say = (message: FromWorker) => postMessage(message);
 const fail = (error: Error) => say({ kind: "failed", text: String(error.message ?? error) });
@@ -18,7 +18,7 @@ const now_us = () => Math.round(1000 * (performance.timeOrigin + performance.now
 class AgentHost {
   private link?: GatewayLink;
   private spool?: SpoolStore;
-  private stored = Promise.resolve(); // what was given to the spool so far
+  private stored = Promise.resolve(); // resolves when all changes so far are in the spool
   private polling?: ReturnType<typeof setInterval>;
 
   private constructor(
@@ -116,7 +116,7 @@ onmessage = ({ data }: MessageEvent<ToWorker>) => {
     host = AgentHost.open(data);
     host.then(() => say({ kind: "opened" }), fail);
   } else {
-    // What comes while it is being opened waits, in order.
+    // Messages that come while the agent is being opened wait, in order.
     host?.then((opened) => opened.on(data)).catch(fail);
   }
 };

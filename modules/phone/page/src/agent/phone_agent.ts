@@ -1,55 +1,55 @@
-// The agent as the page and Node use it: odometry and uplink, compiled to WebAssembly (modules/phone/agent). Whoever calls it owns
-// sensors, clock, network and storage: samples and times go in, sealed packets, poses and keyframes to store come out.
-// One thread: in a page, a Web Worker.
+// The agent as the page and Node use it: odometry and uplink, compiled to WebAssembly (modules/phone/agent). The caller owns sensors,
+// clock, network and storage. Samples and times go in; sealed packets, poses and keyframes to store come out. It must be used on one
+// thread; in a page this is a Web Worker.
 //
-// Frames as everywhere: p_a = T_a_b * p_b; `body` is the IMU, `odom` has z up. Times are microseconds.
+// Frames: p_a = T_a_b * p_b; `body` is the IMU, `odom` has z up. Times are microseconds.
 
 import type { CalibrationConfig, CalibrationOutcome, CalibrationProgress } from '../calibration/camera_calibration';
 import { packRows } from '../sensors/luma';
 
-/** x, y, z in metres; qx, qy, qz, qw. */
+/** x, y, z in metres, then the quaternion qx, qy, qz, qw. */
 export type Pose7 = [number, number, number, number, number, number, number];
 export type Vector3 = [number, number, number];
 
 interface AgentConfig {
   /** 1 to 65535. */
   agent: number;
-  /** The agent's key, 64 hexadecimal digits; empty: no uplink, the odometry alone. */
+  /** The agent's key, 64 hexadecimal digits; empty: only the odometry runs, without uplink. */
   keyHex: string;
-  /** The text of mav0/cam0/sensor.yaml (docs/recordings.md), and of mav0/imu0/sensor.yaml; without the latter options' live_imu counts. */
+  /** The texts of mav0/cam0/sensor.yaml and mav0/imu0/sensor.yaml (docs/recordings.md). Without the latter, live_imu of the options is used. */
   cameraYaml: string;
   imuYaml?: string;
-  /** What `pangea-vio --options` and `pangea-uplink --options` take. */
+  /** The texts of options files, as for `pangea-vio --options` and `pangea-uplink --options`. */
   vioOptionsYaml?: string;
   uplinkOptionsYaml?: string;
-  /** Images come with poses of the device's own odometry (addPosedImage), in place of ours. */
+  /** The device's odometry replaces ours: each image comes with its pose (addPosedImage). */
   devicePoses?: boolean;
-  /** Wall clock, µs since 1970: names the map, so no two runs of an agent may have the same. */
+  /** Wall clock, µs since 1970. It becomes the map's id, so no two runs of an agent may have the same. */
   openedUtime: number;
 }
 
 export interface AgentPose {
-  /** Of the image, sensor clock. */
+  /** Time of the image, sensor clock. */
   utime: number;
   state: 'initialising' | 'tracking' | 'lost';
-  /** Why it does not track, for people; while it does, that the scale is not known, or empty. */
+  /** For people: why the odometry does not track. While it tracks: that the scale is not known, or empty. */
   reason: string;
   /** "agent/openedUtime" of the map whose odom frame this is. */
   map: string;
   T_odom_body: Pose7;
-  /** In the map frame of `group`; both since the first correction of this map. */
+  /** The pose in the map frame of `group`. Both are set after the first correction of this map. */
   T_map_body?: Pose7;
-  /** The map whose odom frame is the map frame: the oldest of those that are fused. */
+  /** The oldest of the fused maps; its odom frame is the map frame. */
   group?: string;
-  /** The server has fused this map into an older one. Of the oldest map of a group an agent is not told that others joined it; `others` says so. */
+  /** The server has fused this map into an older one. It stays false for the oldest map of a group; `others` tells who joined that. */
   fused: boolean;
-  /** Features tracked in this image. */
+  /** Number of features tracked in this image. */
   numTracked: number;
 }
 
 export interface ProcessStatus {
   text: string;
-  /** STATUS_vio_k and STATUS_uplink_k: `counters`, with `pending` and, of each reason, `refused: REASON`. */
+  /** From STATUS_vio_k or STATUS_uplink_k: its `counters`, `pending`, and for each reason `refused: REASON`. */
   counters: Record<string, number>;
 }
 
@@ -58,22 +58,22 @@ export interface ShownAnchor {
   id: string;
   name: string;
   payload: string;
-  /** The agent that made it; 0: a tool on the server. */
+  /** The agent that made the anchor; 0: a tool on the server. */
   owner: number;
-  /** Where to draw it now, in the odom frame of the newest pose's map. */
+  /** The pose at which to draw it now, in the odom frame of the newest pose's map. */
   T_odom_anchor: Pose7;
-  /** Of its position, the largest of three standard deviations. */
+  /** Standard deviation of the position along its least certain direction. */
   sigma_m: number;
   revision: number;
 }
 
 export interface OtherAgent {
   agent: number;
-  /** Its camera, in the odom frame of `Others.map`. */
+  /** The pose of its camera in the odom frame of `Others.map`. */
   T_odom_cam: Pose7;
 }
 
-/** All other agents of the group that track now, at most 16. */
+/** The other agents of the group that track now, at most 16. */
 export interface Others {
   map: string;
   others: OtherAgent[];
@@ -82,25 +82,25 @@ export interface Others {
 export interface SpoolChange {
   op: 'put' | 'delete';
   id: string;
-  /** With 'put'. */
+  /** Only with 'put'. */
   bytes?: Uint8Array;
 }
 
-/** What has come out since the last call that returned some. */
+/** The agent's output since the last call that returned events. */
 export interface AgentEvents {
-  /** Sealed packets for the gateway's WebSocket, a binary message each. */
+  /** Sealed packets for the gateway's WebSocket; each is one binary message. */
   linkUp: Uint8Array[];
-  /** The newest; absent when no image was processed. */
+  /** The newest pose; absent if no image was processed. */
   pose?: AgentPose;
-  /** Once a second. */
+  /** Comes once per second. */
   status?: { vio?: ProcessStatus; uplink?: ProcessStatus };
-  /** All that are shown; absent when nothing changed. Twenty times a second while one moves, else once a second. */
+  /** All anchors that are shown; absent if nothing changed. Comes 20 times per second while one moves, else once per second. */
   anchors?: ShownAnchor[];
-  /** Five times a second while there are any; absent in between. Who is not among them for two seconds is away. */
+  /** Comes five times per second while there are any; absent in between. An agent that is not in it for two seconds is away. */
   others?: Others;
-  /** Keyframes to keep until they are acknowledged, in this order. */
+  /** Changes of the stored keyframes, to be applied in this order. */
   spool: SpoolChange[];
-  /** Finished keyframes, encoded keyframe_2_t, for --out-keyframes and tests. */
+  /** Newly finished keyframes (encoded keyframe_t or keyframe_2_t), for --out-keyframes and tests. */
   keyframes: Uint8Array[];
 }
 
@@ -109,15 +109,15 @@ export interface AnchorEdit {
   name: string;
   /** At most 1000 bytes. */
   payload: string;
-  /** Of the image (sensor clock), which was tracked. */
+  /** Time of the image, sensor clock. The odometry must have tracked this image. */
   utime: number;
-  /** On the surface behind this pixel of that image. */
+  /** Places the anchor on the surface behind this pixel of that image. */
   pixel?: [number, number];
-  /** Or in the body at that time. */
+  /** Or places it relative to the body at that time. */
   T_body_anchor?: Pose7;
 }
 
-// The classes that binding.cc exports.
+// The classes that binding.cc exports, as TypeScript sees them.
 interface NativeAgent {
   imageBuffer(bytes: number): Uint8Array;
   addImu(utime: number, gx: number, gy: number, gz: number, ax: number, ay: number, az: number): void;
@@ -148,7 +148,7 @@ interface NativeModule {
   heapBytes(): number;
 }
 
-/** The default export of pangea_agent.mjs (createPangeaAgent); `options` as emscripten's, e.g. locateFile. */
+/** The default export of pangea_agent.mjs (createPangeaAgent). `options` are emscripten's, e.g. locateFile. */
 export type WasmModuleFactory = (options?: object) => Promise<NativeModule>;
 
 export class PhoneAgent {
@@ -157,7 +157,7 @@ export class PhoneAgent {
     private readonly native: NativeAgent,
   ) {}
 
-  /** Throws what is wrong with the configuration: the field and the mend. */
+  /** Throws an error if the configuration is wrong; it names the field and says what to do. */
   static async load(factory: WasmModuleFactory, config: AgentConfig, options?: object): Promise<PhoneAgent> {
     const module = await factory(options);
     const { agent, error } = module.createAgent(config);
@@ -167,14 +167,14 @@ export class PhoneAgent {
     return new PhoneAgent(module, agent);
   }
 
-  /** rad/s and m/s² (specific force: +9.81 upwards when stationary), in the body frame; in the order of time. */
+  /** Gyro in rad/s and specific force in m/s² (+9.81 upwards when stationary), in the body frame; in order of time. */
   addImu(utime: number, gyro: Vector3, accel: Vector3): void {
     this.native.addImu(utime, ...gyro, ...accel);
   }
 
   /**
-   * A grey image of the calibration's size, `stride` bytes a row. It is processed when samples have come that reach past it: in this
-   * call, or in an addImu after it, whose results the next call returns.
+   * Adds a grey image of the calibration's size, with `stride` bytes per row. It is processed when there are samples beyond its time: in
+   * this call, or in a later addImu; the next call that returns events then has the results.
    */
   addImage(utime: number, luma: Uint8Array, width: number, height: number, stride: number): AgentEvents {
     const buffer = this.native.imageBuffer(width * height);
@@ -183,26 +183,26 @@ export class PhoneAgent {
     return this.native.take();
   }
 
-  /** With `devicePoses`: with the pose that the device has for it, z up; without one it is lost. */
+  /** With `devicePoses`: adds an image with the device's pose, z up; null if the device's odometry is lost. */
   addPosedImage(utime: number, luma: Uint8Array, width: number, height: number, stride: number, T_odom_body: Pose7 | null): AgentEvents {
     packRows(luma, width, height, stride, this.native.imageBuffer(width * height));
     this.native.addPosedImage(utime, width, height, T_odom_body);
     return this.native.take();
   }
 
-  /** A packet from the gateway's WebSocket. What is not for this agent is counted and dropped. */
+  /** Takes a packet from the gateway's WebSocket. Packets that are not for this agent are counted and dropped. */
   onLinkDown(packet: Uint8Array): void {
     this.native.onLinkDown(packet);
   }
 
-  /** What an earlier run has put and not deleted, in the order of putting; before the first image. */
+  /** Gives back the keyframes that an earlier run put and did not delete, in the order of putting. Call it before the first image. */
   restoreSpool(entries: Array<{ id: string; bytes: Uint8Array }>): void {
     for (const { id, bytes } of entries) {
       this.native.restore(id, bytes);
     }
   }
 
-  /** The new anchor's id. Throws when the agent does not track, or a field is out of its bounds. */
+  /** Returns the new anchor's id. Throws if the agent does not track or a field is out of bounds. */
   placeAnchor(edit: AnchorEdit): string {
     const id = this.native.placeAnchor(edit);
     if (id.startsWith('error: ')) {
@@ -215,18 +215,18 @@ export class PhoneAgent {
     this.native.removeAnchor(id);
   }
 
-  /** Every 10 to 20 ms. `nowUs`: µs since 1970 that never step, 1000 * (performance.timeOrigin + performance.now()). */
+  /** Call it every 10 to 20 ms. `nowUs`: µs since 1970 without steps, 1000 * (performance.timeOrigin + performance.now()). */
   poll(nowUs: number): AgentEvents {
     this.native.poll(nowUs);
     return this.native.take();
   }
 
-  /** The sensors' time begins anew: finishes the map, the next image opens another. */
+  /** The sensors' time starts again: finishes the map; the next image opens another. */
   startAnew(): void {
     this.native.startAnew();
   }
 
-  /** No more images: finishes the keyframes in the window. */
+  /** No more images come: finishes the keyframes in the window. */
   flush(): AgentEvents {
     this.native.flush();
     return this.native.take();
@@ -236,7 +236,7 @@ export class PhoneAgent {
     return this.module.heapBytes();
   }
 
-  /** Frees it; it may not be called any more. */
+  /** Frees the agent; it must not be called any more. */
   close(): void {
     this.native.delete();
   }

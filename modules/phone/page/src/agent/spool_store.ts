@@ -1,5 +1,4 @@
-// Keyframes that wait for the server, in the browser's IndexedDB: what was put and not deleted is there again when the page is
-// opened anew.
+// Stores keyframes that wait for the server in the browser's IndexedDB, so that they are still there when the page is opened again.
 
 import type { SpoolChange } from "./phone_agent";
 
@@ -13,7 +12,7 @@ const done = <T>(request: IDBRequest<T>) =>
 
 interface Entry {
   id: string;
-  order: number; // in which it was put
+  order: number; // counts the entries in the order of putting
   bytes: Uint8Array;
 }
 
@@ -31,13 +30,13 @@ export class SpoolStore {
     return store;
   }
 
-  // In the order in which they were put.
+  // All entries, in the order in which they were put.
   async entries(): Promise<Entry[]> {
     const all: Entry[] = await done(this.database.transaction(kStore).objectStore(kStore).getAll());
     return all.sort((a, b) => a.order - b.order);
   }
 
-  // All or nothing; transactions of one store happen in the order of these calls.
+  // Applies all changes or none. Several calls take effect in their order.
   async apply(changes: SpoolChange[]): Promise<void> {
     const transaction = this.database.transaction(kStore, "readwrite");
     const store = transaction.objectStore(kStore);

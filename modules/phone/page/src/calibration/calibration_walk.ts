@@ -1,4 +1,4 @@
-// The first seconds with an unknown camera: its sensors, live or of a recording, go to the worker that calibrates, until it is done.
+// The calibration of an unknown camera: sensor data, live or from a recording, go to the worker that calibrates, until it is done.
 
 import { Quaternion } from "three";
 import { packImu } from "../messages";
@@ -16,19 +16,19 @@ import type { Stage } from "../view/stage";
 import type { CalibrationConfig, CalibrationProgress } from "./camera_calibration";
 import type { FromCalibration, ToCalibration } from "./messages";
 
-const kLongest_us = 60_000_000; // of a recording that is calibrated on
+const kLongest_us = 60_000_000; // longest part of a recording that is used
 
 type Image = Luma & { utime: number; picture: ImageBitmap };
 
 export class CalibrationWalk {
   progress: CalibrationProgress = { share: 0, missing: "time" };
-  refused = ""; // why the last try was
+  refused = ""; // why the last try was refused
   brightness = 255;
   motionSilent = false;
-  readonly done: Promise<string>; // the camera's sensor.yaml; fails with words for the visitor, never when it is stopped
+  readonly done: Promise<string>; // the camera's sensor.yaml; fails with a text for the visitor; never settles if stopped
   private readonly worker = new Worker(new URL("./worker.ts", import.meta.url), { type: "module" });
   private stopSensors = () => {};
-  private taken = () => {}; // the image at the worker
+  private taken = () => {}; // called when the worker is done with its image
   private atEnd = false;
   private succeed!: (cameraYaml: string) => void;
   private fail!: (error: Error) => void;
@@ -40,7 +40,7 @@ export class CalibrationWalk {
     this.say({ kind: "open", config });
   }
 
-  // With the phone's own sensors. Of the rough camera its size and rotation count. The camera stays open.
+  // Calibrates with the phone's own sensors. Only size and rotation of the rough camera are used. The camera stays open.
   static live(camera: Camera, { width, height, T_body_cam }: CameraModel, stage: Stage): CalibrationWalk {
     const q_body_cam = new Quaternion().setFromRotationMatrix(T_body_cam).toArray() as CalibrationConfig["q_body_cam"];
     const walk = new CalibrationWalk({ width, height, imuYaml: kPhoneImu, q_body_cam }, stage);
@@ -55,7 +55,7 @@ export class CalibrationWalk {
     return walk;
   }
 
-  // Of a recording as much as it takes, at most a minute; as fast as it goes.
+  // Calibrates on as much of a recording as needed, at most a minute, as fast as possible.
   static async ofRecording(recording: Recording, stage: Stage): Promise<CalibrationWalk> {
     const first = await Player.load(recording, 0);
     if (!first) throw new Error(`${recording.images[0].name}: the browser cannot read this image`);

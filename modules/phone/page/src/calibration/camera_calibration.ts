@@ -1,23 +1,23 @@
-// A camera calibrated while somebody moves it, compiled to WebAssembly (modules/phone/agent/camera_calibration.h). One thread: in a
-// page, a Web Worker. Times are microseconds.
+// Calibrates a camera while somebody moves it; compiled to WebAssembly (modules/phone/agent/camera_calibration.h). It must be used on
+// one thread; in a page this is a Web Worker. Times are microseconds.
 
 import type { NativeCalibration, Vector3, WasmModuleFactory } from "../agent/phone_agent";
 import { packRows } from "../sensors/luma";
 
 export interface CalibrationConfig {
-  /** Of the images, pixels. */
+  /** Size of the images, pixels. */
   width: number;
   height: number;
   /** The text of mav0/imu0/sensor.yaml. */
   imuYaml: string;
-  /** x, y, z, w of the rotation camera to body, where it is known to some degrees. */
+  /** The rotation from camera to body as x, y, z, w, if it is known within some degrees. */
   q_body_cam?: [number, number, number, number];
 }
 
 export interface CalibrationProgress {
-  /** Of what suffices, 0 to 1. */
+  /** Share of the motion that suffices, 0 to 1. */
   share: number;
-  /** What is missing most; nothing when it suffices. */
+  /** What is missing most; empty if the motion suffices. */
   missing: "" | "points" | "time" | "rotation about x" | "rotation about y" | "rotation about z";
 }
 
@@ -36,7 +36,7 @@ export class CameraCalibration {
     private readonly config: CalibrationConfig,
   ) {}
 
-  /** Throws what is wrong with the configuration. */
+  /** Throws an error if the configuration is wrong. */
   static async load(factory: WasmModuleFactory, config: CalibrationConfig, options?: object): Promise<CameraCalibration> {
     const { calibration, error } = (await factory(options)).createCalibration(config);
     if (!calibration) throw new Error(error);
@@ -53,21 +53,21 @@ export class CameraCalibration {
     this.native.addImage(utime);
   }
 
-  /** How far it is with the image of `utime`; nothing to say at most images. */
+  /** The progress at the image of `utime`; undefined for most images, because it is computed seldom. */
   progressAt(utime: number): CalibrationProgress | undefined {
     if (utime < this.nextProgress) return undefined;
     this.nextProgress = utime + kProgressEvery_us;
     return this.native.progress();
   }
 
-  /** Solves when there is enough, and not again at once where that was refused. */
+  /** Solves if the motion suffices. After a refusal it waits before it tries again. */
   tryAt(utime: number, { share }: CalibrationProgress): CalibrationOutcome | undefined {
     if (share < 1 || utime < this.nextTry) return undefined;
     this.nextTry = utime + kTryAgainAfter_us;
     return this.solve();
   }
 
-  /** With what there is. */
+  /** Solves with the data that there are. */
   solve(): CalibrationOutcome {
     return this.native.solve();
   }

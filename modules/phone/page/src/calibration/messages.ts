@@ -1,16 +1,16 @@
-// What the page and the worker that calibrates say to each other. Times are microseconds.
+// The messages between the page and the worker that calibrates. Times are microseconds.
 
 import type { CalibrationConfig, CalibrationProgress } from "./camera_calibration";
 
 export type ToCalibration =
   | { kind: "open"; config: CalibrationConfig }
-  | { kind: "imu"; samples: Float64Array } // kImuStride values each, as to the agent
+  | { kind: "imu"; samples: Float64Array } // kImuStride values per sample, as for the agent
   | { kind: "image"; utime: number; luma: Uint8Array; stride: number }
-  | { kind: "finish" }; // no more comes: what there is must do
+  | { kind: "finish" }; // no more data come: solve with those that there are
 
 export type FromCalibration =
   | { kind: "failed"; text: string }
   | { kind: "taken"; utime: number }
-  | { kind: "progress"; progress: CalibrationProgress } // 1: it solves now, for seconds
-  | { kind: "refused"; text: string } // it goes on, unless it was to finish
+  | { kind: "progress"; progress: CalibrationProgress } // share 1: it now solves, which takes seconds
+  | { kind: "refused"; text: string } // the calibration continues, unless it was told to finish
   | { kind: "done"; cameraYaml: string };

@@ -1,4 +1,4 @@
-// Calibration in a Web Worker of its own, so that its memory goes with it.
+// Runs the calibration in its own Web Worker, so that its memory is freed with the worker.
 
 import type { WasmModuleFactory } from "../agent/phone_agent";
 import { kImuStride } from "../messages";
@@ -6,7 +6,7 @@ import { CameraCalibration } from "./camera_calibration";
 import type { CalibrationOutcome } from "./camera_calibration";
 import type { FromCalibration, ToCalibration } from "./messages";
 
-const kModule = "/pangea_agent.mjs"; // lies beside the page
+const kModule = "/pangea_agent.mjs"; // beside the page
 
 const say = (message: FromCalibration) => postMessage(message);
 const fail = (error: Error) => say({ kind: "failed", text: String(error.message ?? error) });
@@ -52,7 +52,7 @@ onmessage = ({ data }: MessageEvent<ToCalibration>) => {
       CameraCalibration.load(module.default, data.config));
     calibration.catch(fail);
   } else {
-    // What comes while it is being loaded waits, in order.
+    // Messages that come while the module is loading wait, in order.
     calibration?.then((opened) => take(opened, data)).catch(fail);
   }
 };

@@ -1,24 +1,24 @@
-// The agent's WebSocket to the gateway: sealed packets, one a message, in both directions. The gateway first sends a nonce and
-// gets proof of the agent's key for it. Opened again when it is lost.
+// The agent's WebSocket to the gateway: sealed packets in both directions, one per message. The gateway first sends a nonce, and gets
+// a proof that we have the agent's key. A lost WebSocket is opened again.
 
 import type { LinkState } from "../messages";
 
 const kFirstRetry_ms = 1000;
 const kLongestRetry_ms = 15_000;
 const kSilent_ms = 10_000; // the server answers every second: after this the network is gone, and a new socket sooner through than an old one
-const kMaxWaiting_bytes = 256_000; // in the socket: what is beyond is dropped, the link repeats it
+const kMaxWaiting_bytes = 256_000; // in the socket; beyond it packets are dropped, and the link repeats them
 
-// Why the gateway closes for good, by its close codes: the key is unknown or revoked; another page of this agent came.
+// The close codes after which we do not connect again: the key is unknown or revoked; another page of this agent connected.
 const kFinal = new Map<number, LinkState>([[4401, "refused"], [4409, "replaced"]]);
 
-// Of the gateway that served this page.
+// The WebSocket origin of the gateway that served this page.
 export const gatewayOrigin = () => `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}`;
 
 function bytesOfHex(hex: string): Uint8Array<ArrayBuffer> {
   return Uint8Array.from(hex.match(/../g) ?? [], (byte) => parseInt(byte, 16));
 }
 
-// HMAC-SHA-256(key, "pangea-gateway-v1:" + agent + ":" + nonce).
+// The proof: HMAC-SHA-256(key, "pangea-gateway-v1:" + agent + ":" + nonce).
 export async function proofOf(keyHex: string, agent: number, nonce: Uint8Array): Promise<Uint8Array<ArrayBuffer>> {
   const hmac = { name: "HMAC", hash: "SHA-256" };
   const key = await crypto.subtle.importKey("raw", bytesOfHex(keyHex), hmac, false, ["sign"]);
@@ -44,7 +44,7 @@ export class GatewayLink {
     this.connect();
   }
 
-  // False: it is not sent, the link sends it another time.
+  // False if the packet was not sent; the link sends it again later.
   send(packet: Uint8Array): boolean {
     if (this.state !== "open" || !this.socket || this.socket.bufferedAmount > kMaxWaiting_bytes) return false;
     this.socket.send(packet as Uint8Array<ArrayBuffer>);
@@ -61,7 +61,8 @@ export class GatewayLink {
     this.listen(socket);
   }
 
-  // From now on it may be silent for so long; closing it in a network that is gone would take longer still.
+  // Restarts the timer for silence. After it the socket is given up without waiting for it to close, which takes longer still in a
+  // network that is gone.
   private listen(socket: WebSocket) {
     clearTimeout(this.silence);
     this.silence = setTimeout(() => {

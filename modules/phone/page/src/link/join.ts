@@ -1,15 +1,15 @@
-// Joining a site: a one-time code for an agent's key, which stays in this browser's storage.
+// Joining a site: a one-time code is exchanged for an agent's key, which is kept in this browser's storage.
 
 import type { Membership } from "../messages";
 
 const kStorageKey = "pangea.membership";
 
-// The code in a link of `pangea-gateway invite`: https://server:8443/#join=CODE
+// The code in a link made by `pangea-gateway invite`: https://server:8443/#join=CODE
 export function codeIn(hash: string): string | undefined {
   return new URLSearchParams(hash.replace(/^#/, "")).get("join") ?? undefined;
 }
 
-// What is stored, if it is one; anything else is as if nothing were there.
+// The stored membership; undefined if there is none or it is not valid.
 export function parseMembership(json: string | null): Membership | undefined {
   try {
     const { agent, key, site, name } = JSON.parse(json ?? "null") ?? {};
@@ -23,7 +23,7 @@ export function parseMembership(json: string | null): Membership | undefined {
 export const storedMembership = () => parseMembership(localStorage.getItem(kStorageKey));
 export const forgetMembership = () => localStorage.removeItem(kStorageKey);
 
-// Throws what the server says, for the visitor.
+// Throws an error with the server's text for the visitor.
 export async function join(code: string, name: string): Promise<Membership> {
   const answer = await fetch("/v1/join", {
     method: "POST",

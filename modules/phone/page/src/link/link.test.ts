@@ -25,7 +25,7 @@ test("storage that somebody else wrote is no membership", () => {
   }
 });
 
-// A socket whose other side is the test.
+// A fake WebSocket; the test plays the server.
 class FakeSocket {
   static readonly OPEN = 1;
   static all: FakeSocket[] = [];
@@ -61,10 +61,10 @@ test("a socket that says nothing for ten seconds is given up for a new one", asy
   assert.deepEqual([link.state, packets], ["open", [100]]);
   mock.timers.tick(1_000);
   assert.equal(link.state, "connecting");
-  socket.says(50); // late, and of no use any more
+  socket.says(50); // too late: it must be ignored
   mock.timers.tick(1_000);
   assert.deepEqual([FakeSocket.all.length, packets], [2, [100]]);
-  mock.timers.tick(10_000); // nobody answers that one either
+  mock.timers.tick(10_000); // the second socket gets no answer either
   mock.timers.tick(2_000);
   assert.equal(FakeSocket.all.length, 3);
   mock.timers.reset();

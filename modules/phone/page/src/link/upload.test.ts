@@ -5,7 +5,7 @@ import { uploadRecording } from "./upload";
 
 const kMembership = { agent: 7, key: "ab".repeat(32), site: "hall", name: "Anna" };
 
-// A socket whose other side is the test.
+// A fake WebSocket; the test plays the server.
 class FakeSocket {
   static readonly OPEN = 1;
   static last: FakeSocket;

@@ -1,5 +1,5 @@
-// Uploads a recording to the gateway: the proof as on the link, then size and bytes, as far ahead of what the server has taken as it
-// allows (modules/gateway/recording/recording_socket.h).
+// Uploads a recording to the gateway: first the proof as on the link, then the size and the bytes. It sends at most as far ahead of
+// the bytes taken by the server as allowed (modules/gateway/recording/recording_socket.h).
 
 import type { Membership } from "../messages";
 import { proofOf } from "./gateway_link";
@@ -50,7 +50,7 @@ class Upload {
   }
 }
 
-// The file's name at the server. Throws the reason for which it is not kept there, for the visitor.
+// Resolves to the file's name at the server. Fails with a text for the visitor if the server does not keep the recording.
 export function uploadRecording(origin: string, membership: Membership, zip: Blob, onProgress: (share: number) => void): Promise<string> {
   return new Promise((done, failed) => {
     const socket = new WebSocket(`${origin}/recording?agent=${membership.agent}`);

@@ -1,4 +1,4 @@
-// pangea-agent: the agent that phones run, in Node, with a recording for sensors.
+// pangea-agent: runs the agent of phones in Node, with a recording instead of sensors.
 //
 //   recording ─► PhoneAgent ─► FILE.tum, FILE.lcm
 //                    ▲▼ sealed packets
@@ -21,11 +21,11 @@ import { KeyframeLog, TumFiles } from "./outputs";
 import { lumaOf } from "./png";
 
 const kPoll_ms = 10;
-const kMaxLag_ms = 1000; // of an image, in real time, before it is left out
+const kMaxLag_ms = 1000; // in real time, an image that is later than this is left out
 const kImuBeforeStart_us = 500_000;
-const kAhead_us = 60_000; // samples go before their image, past its last row
+const kAhead_us = 60_000; // samples are added this far ahead: past an image's last row
 const kNoPose = 2; // exit code
-const kNoProgress_ms = 20_000; // of acknowledgements, at the end
+const kNoProgress_ms = 20_000; // at the end, longest wait without a new acknowledgement
 
 const now_us = () => Math.round(1000 * (performance.timeOrigin + performance.now()));
 const pause = (ms: number) => new Promise((done) => setTimeout(done, ms));
@@ -71,8 +71,8 @@ class Session {
   private readonly tum?: TumFiles;
   private readonly keyframeLog?: KeyframeLog;
   private readonly link?: GatewayLink;
-  private waiting = 0; // keyframes that the server has not acknowledged
-  private readonly times_ms: number[] = []; // of CPU, for each image
+  private waiting = 0; // number of keyframes that the server has not acknowledged
+  private readonly times_ms: number[] = []; // CPU time of each image
   private keyframes = 0;
   private tracked = 0;
   private dropped = 0;
@@ -106,7 +106,7 @@ class Session {
     this.take(this.agent.poll(now_us()));
   }
 
-  // Polls until then, in ms of performance.now().
+  // Polls until `time_ms` of performance.now().
   private async waitUntil(time_ms: number) {
     do {
       this.poll();
@@ -142,7 +142,7 @@ class Session {
     }
   }
 
-  // The keyframes in the window, and, with a server, until all are acknowledged or none is for long.
+  // Finishes the keyframes in the window. With a server, waits until all keyframes are acknowledged, or none was for kNoProgress_ms.
   async finish(): Promise<number> {
     this.take(this.agent.flush());
     let progress_ms = performance.now();

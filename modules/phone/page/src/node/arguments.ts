@@ -1,4 +1,4 @@
-// The command line of pangea-agent: pangea-vio's options, as far as an agent in Node has them, and the gateway.
+// The command line of pangea-agent: those options of pangea-vio that an agent in Node has, and the gateway.
 
 import { readFileSync } from "node:fs";
 import { parseArgs } from "node:util";
@@ -44,7 +44,7 @@ function keyOf(file: string): string {
   return key;
 }
 
-// Nothing: help was asked for.
+// Returns undefined if help was asked for.
 export function argumentsOf(words: string[]): Arguments | undefined {
   const text = { type: "string" } as const;
   const { values } = parseArgs({

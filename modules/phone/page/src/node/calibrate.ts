@@ -1,4 +1,4 @@
-// A recording whose camera is unknown is calibrated before it is played, as the page does it.
+// Calibrates the camera of a recording without calibration before it is played, as the page does.
 
 import { CameraCalibration } from "../calibration/camera_calibration";
 import type { CalibrationOutcome } from "../calibration/camera_calibration";
@@ -7,7 +7,7 @@ import type { Recording } from "../recording/euroc";
 import { lumaOf } from "./png";
 
 const kLongest_us = 60_000_000;
-const kAhead_us = 60_000; // samples go before their image
+const kAhead_us = 60_000; // samples are added this far ahead of images
 
 export async function cameraYamlOf({ files, images, imu, imuYaml }: Recording, factory: WasmModuleFactory, options: object): Promise<string> {
   const { width, height } = lumaOf(await files.read(images[0].name));

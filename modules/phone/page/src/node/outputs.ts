@@ -1,11 +1,11 @@
-// What pangea-agent writes: trajectories in TUM's format, keyframes as an LCM log.
+// Writes the output of pangea-agent: trajectories in TUM's format, and keyframes as an LCM log.
 
 import { closeSync, openSync, writeSync } from "node:fs";
 
 import type { AgentPose } from "../agent/phone_agent";
 
 const kLogMagic = 0xeda1da01;
-const kUtimeOffset = 24; // in keyframe_t and keyframe_2_t: behind its fingerprint and its id
+const kUtimeOffset = 24; // of utime in keyframe_t and keyframe_2_t: after the fingerprint and the id
 
 export class TumFiles {
   private file?: number;
@@ -14,7 +14,7 @@ export class TumFiles {
 
   constructor(private readonly path: string) {}
 
-  // A pose that is tracked. Each map has a file of its own.
+  // Writes a tracked pose. Each map has its own file.
   write({ utime, map, T_odom_body }: AgentPose) {
     if (map !== this.map) {
       this.close();

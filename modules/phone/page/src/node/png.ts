@@ -1,4 +1,4 @@
-// Grey pixels of a grey or coloured PNG: its first channel, as of the recordings that there are.
+// Reads a PNG as grey pixels. Only its first channel is used, which is right for grey images.
 
 import { PNG } from "pngjs";
 

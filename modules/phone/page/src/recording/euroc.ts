@@ -1,4 +1,4 @@
-// A recording in EuRoC's format (docs/recordings.md): calibration if there is one, inertial samples, and which images there are.
+// Reads a recording in EuRoC's format (docs/recordings.md): the calibration if there is one, inertial samples, and the list of images.
 
 import { Matrix4 } from "three";
 import { kPhoneImu } from "../sensors/calibration";
@@ -22,7 +22,7 @@ export interface Recording {
   imuYaml: string;
   imu: ImuSample[];
   images: RecordedImage[];
-  // Without cam0/sensor.yaml there are none.
+  // Both are missing without cam0/sensor.yaml.
   camera?: CameraModel;
   cameraYaml?: string;
 }
@@ -31,7 +31,7 @@ export type CalibratedRecording = Recording & Required<Pick<Recording, "camera" 
 
 export const isCalibrated = (recording: Recording): recording is CalibratedRecording => recording.camera !== undefined;
 
-// With the text of a cam0/sensor.yaml, which `file` stands for in messages.
+// The recording with the calibration from the text of a cam0/sensor.yaml; `file` is its name in messages.
 export function withCamera(recording: Recording, cameraYaml: string, file: string): CalibratedRecording {
   const T_rig_body = parseExtrinsics(recording.imuYaml, "imu0/sensor.yaml");
   return { ...recording, cameraYaml, camera: parseCamera(cameraYaml, file, T_rig_body) };
@@ -39,7 +39,7 @@ export function withCamera(recording: Recording, cameraYaml: string, file: strin
 
 const text = async (files: Files, name: string) => new TextDecoder().decode(await files.read(name));
 
-// The folder that holds cam0 and imu0, with its slash.
+// The folder that contains cam0 and imu0, with a final slash.
 function rootOf(names: string[]): string {
   const roots = names
     .map((name) => /^(.*?)cam0\/data\.csv$/.exec(name)?.[1])
@@ -49,7 +49,7 @@ function rootOf(names: string[]): string {
   return roots[0];
 }
 
-// Stamps are nanoseconds, more than a double holds: their last three digits are left out before they are numbers.
+// Time stamps in nanoseconds do not fit a double, so their last three digits are cut off before conversion.
 const utimeOf = (nanoseconds: string) => Number(nanoseconds.trim().slice(0, -3));
 
 function rows(csv: string, file: string, columns: number): string[][] {

@@ -1,4 +1,4 @@
-// What was dropped onto the page: a folder or a zip, as names and contents.
+// The files of a folder or zip that was dropped onto the page, by name.
 
 import { unzipSync } from "fflate";
 
@@ -18,7 +18,7 @@ export async function filesOfZip(zip: Blob): Promise<Files> {
   }
   return {
     names,
-    // One file at a time: all images of a recording unpacked would not fit a phone's memory.
+    // Unpacks one file at a time, because all images together would not fit a phone's memory.
     read: async (name) => {
       const found = unzipSync(bytes, { filter: (file) => file.name === name })[name];
       if (!found) throw new Error(`${name} is not in the zip`);
@@ -38,7 +38,7 @@ export function filesOf(byName: Map<string, Blob>): Files {
   };
 }
 
-// Everything below a dropped folder. Must be called within the drop's event: its items are gone afterwards.
+// All files below a dropped folder. It must be called within the drop event, because the items are invalid afterwards.
 export async function filesOfDrop(items: DataTransferItemList): Promise<Map<string, Blob>> {
   const entries = [...items].map((item) => item.webkitGetAsEntry()).filter((entry) => entry !== null);
   const byName = new Map<string, Blob>();
@@ -54,7 +54,7 @@ async function addEntry(entry: FileSystemEntry, byName: Map<string, Blob>) {
   }
   const reader = (entry as FileSystemDirectoryEntry).createReader();
   for (;;) {
-    // A reader gives a hundred or so at a time, and none at the end.
+    // A reader returns about a hundred entries per call, and none at the end.
     const some = await new Promise<FileSystemEntry[]>((done, failed) => reader.readEntries(done, failed));
     if (some.length === 0) return;
     for (const child of some) await addEntry(child, byName);

@@ -1,11 +1,11 @@
-// Plays a recording as if its sensors were there: at the speed at which it was made, or as fast as the agent takes it. No image
-// is left out: an agent that is slower slows the player down.
+// Plays a recording like live sensors: in real time, or as fast as the agent can process it. No image is left out; a slow agent slows
+// the player down.
 
 import { lumaOfPicture } from "../sensors/luma";
 import type { Luma } from "../sensors/luma";
 import type { ImuSample, Recording } from "./euroc";
 
-const kAhead_us = 60_000; // samples go before their image, past its last row
+const kAhead_us = 60_000; // samples are added this far ahead: past an image's last row
 
 export interface RecordedPicture extends Luma {
   utime: number;
@@ -14,14 +14,14 @@ export interface RecordedPicture extends Luma {
 
 interface PlayerSink {
   addImu(samples: ImuSample[]): void;
-  // Resolves when the agent is done with it.
+  // Resolves when the agent has processed the image.
   addImage(image: RecordedPicture): Promise<void>;
 }
 
 export class Player {
   private stopped = false;
 
-  // The image of that index; nothing where the browser cannot read it.
+  // Loads the image with this index; undefined if the browser cannot read it.
   static async load({ files, images }: Recording, index: number): Promise<RecordedPicture | undefined> {
     const { utime, name } = images[index];
     const encoded = await files.read(name);
@@ -40,7 +40,7 @@ export class Player {
     this.stopped = true;
   }
 
-  // To the end, or until it is stopped. `onImage`: the share that is played.
+  // Plays to the end, or until it is stopped. `onImage` gets the share that was played.
   async play(onImage: (share: number) => void): Promise<void> {
     const { images, imu } = this.recording;
     const began_ms = performance.now();

@@ -1,10 +1,10 @@
-// Records what the phone senses: every image the camera gives as JPEG, every inertial sample, and the calibration that was used.
+// Records the phone's sensors: every camera image as JPEG, every inertial sample, and the calibration that was used.
 
 import type { CameraImage } from "../sensors/camera";
 import type { ImuSample } from "./euroc";
 import { RecordingWriter } from "./writer";
 
-const kMaxEncoding = 4; // images at once; what comes beyond is left out, and counted
+const kMaxEncoding = 4; // images encoded at once; further ones are left out and counted
 const kQuality = 0.92;
 
 export class Recorder {
@@ -28,7 +28,7 @@ export class Recorder {
     this.writer.addImu(sample);
   }
 
-  // The picture may be closed as soon as this has returned.
+  // The caller may close the picture when this returns.
   addImage({ utime, picture, width, height }: CameraImage) {
     if (this.encoding.size >= kMaxEncoding) {
       ++this.numLeftOut;

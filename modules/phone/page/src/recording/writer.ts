@@ -1,5 +1,5 @@
-// Writes a recording in EuRoC's format as a zip, as it comes: images stay compressed as they are, in pieces that the
-// browser may put on its disk.
+// Writes a recording in EuRoC's format to a zip while it is made. Images are stored as they are, already compressed, in pieces that
+// the browser may keep on its disk.
 
 import { strToU8, Zip, ZipDeflate, ZipPassThrough } from "fflate";
 import type { ImuSample } from "./euroc";
@@ -21,7 +21,7 @@ export class RecordingWriter {
   private failure?: Error;
   numImages = 0;
 
-  // `folder`: the name of the recording, which holds mav0.
+  // `folder`: the name of the recording, the folder that contains mav0.
   constructor(private readonly folder: string) {
     this.zip = new Zip((error, data) => {
       if (error) this.failure = error;
@@ -29,7 +29,7 @@ export class RecordingWriter {
     });
   }
 
-  // `extension`: jpg or png, what `encoded` is.
+  // `extension`: the format of `encoded`, jpg or png.
   addImage(utime: number, encoded: Uint8Array, extension: string) {
     const name = `${nanoseconds(utime)}.${extension}`;
     this.imageRows.push(`${nanoseconds(utime)},${name}`);
@@ -41,7 +41,7 @@ export class RecordingWriter {
     this.imuRows.push([nanoseconds(utime), ...[...gyro, ...accel].map((v) => v.toFixed(9))].join(","));
   }
 
-  // Nothing can be added afterwards.
+  // Returns the zip. Nothing can be added afterwards.
   finish(cameraYaml: string, imuYaml: string): Blob {
     const text = (name: string, content: string) =>
       this.add(new ZipDeflate(`${this.folder}/mav0/${name}`), strToU8(content));

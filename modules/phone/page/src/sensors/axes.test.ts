@@ -26,7 +26,7 @@ test("up: flat on a table, held upright, on its right edge", () => {
 test("the sign is found from readings that have gravity in them, and kept", () => {
   const ios = new GravitySign();
   assert.equal(ios.sign, 1);
-  ios.add([0, 0, -1], [0, 0, 1]); // falling: says nothing
+  ios.add([0, 0, -1], [0, 0, 1]); // in free fall there is no gravity to measure
   assert.equal(ios.sign, 1);
   for (let i = 0; i < 10; ++i) ios.add([0, -9.7, -0.5], upInBody(88, 2));
   assert.ok(ios.decided);
@@ -36,10 +36,10 @@ test("the sign is found from readings that have gravity in them, and kept", () =
 });
 
 test("the camera looks out of the back in every orientation, its image upright on the screen", () => {
-  // Where the image's right and down edges lie on the device.
+  // The image's right and down directions in the device's axes.
   const cases: [number, Vector3, Vector3][] = [
     [0, [1, 0, 0], [0, -1, 0]], // upright
-    [90, [0, -1, 0], [-1, 0, 0]], // on its left side: the top of the device points left
+    [90, [0, -1, 0], [-1, 0, 0]], // on its left side: the device's top points left
     [180, [-1, 0, 0], [0, 1, 0]], // upside down
     [270, [0, 1, 0], [1, 0, 0]], // on its right side
   ];

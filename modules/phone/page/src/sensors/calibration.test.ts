@@ -11,7 +11,7 @@ test("a rough calibration is read as a camera that looks out of the back", () =>
     assert.ok(ahead.distanceTo(new Vector3(0, 0, -1)) < 1e-9);
     assert.ok(Math.abs(camera.T_body_cam.determinant() - 1) < 1e-9);
     assert.deepEqual(project(camera, new Vector3(0, 0, 1)), [(width - 1) / 2, (height - 1) / 2]);
-    // Both sides of the longer edge are 65 degrees apart.
+    // The field of view along the longer side is 65 degrees.
     const edge = Math.tan((32.5 / 180) * Math.PI);
     const [u, v] = project(camera, width > height ? new Vector3(edge, 0, 1) : new Vector3(0, edge, 1))!;
     assert.ok(Math.abs(Math.max(u, v) - 639) < 6, `${u}, ${v}`);

@@ -1,16 +1,16 @@
-// The calibration of this phone's camera: the one that is stored for it, or one that no phone is far from, with standard
-// deviations that say so.
+// The calibration of this phone's camera: the stored one, or a rough one for any phone, with standard deviations that are
+// large enough.
 
 import { cameraInBody } from "./axes";
 
 export interface CameraKind {
   label: string; // of the MediaStreamTrack
-  width: number; // pixels, as they are delivered
+  width: number; // of the delivered images, pixels
   height: number;
-  angle_deg: number; // screen.orientation.angle, by which the browser turns images upright
+  angle_deg: number; // screen.orientation.angle, by which the browser rotates images upright
 }
 
-// Of the longer side: phones' main cameras see 60 to 70 degrees along it.
+// Shares of the longer side: the main cameras of phones see 60 to 70 degrees along it.
 const kFocal = 0.78;
 const kFocalSigma = 0.08;
 const kCentreSigma = 0.01;
@@ -23,12 +23,12 @@ export const storeCalibration = (kind: CameraKind, cameraYaml: string) => localS
 
 export const storedCalibrations = () => Object.keys(localStorage).filter((key) => key.startsWith(kPrefix)).length;
 
-// Of all cameras.
+// Forgets the calibrations of all cameras.
 export function forgetCalibrations() {
   for (const key of Object.keys(localStorage)) if (key.startsWith(kPrefix)) localStorage.removeItem(key);
 }
 
-// The text of a cam0/sensor.yaml.
+// The rough calibration as the text of a cam0/sensor.yaml.
 export function roughCalibration({ width, height, angle_deg }: CameraKind): string {
   const longer = Math.max(width, height);
   const focal = kFocal * longer;
@@ -55,8 +55,9 @@ intrinsics_sigma: [${focalSigma}, ${focalSigma}, ${centreSigma}, ${centreSigma}]
 `;
 }
 
-// The text of an imu0/sensor.yaml. Browsers give 60 Hz, rounded to 0.1 m/s^2 and 0.1 deg/s: as white noise of a sample
-// 0.029 m/s^2 and 0.0005 rad/s (a step's width over the root of 12), times the root of the period on top of a phone's own.
+// The text of an imu0/sensor.yaml. Browsers give 60 Hz, rounded to 0.1 m/s^2 and 0.1 deg/s. The rounding is like white noise of
+// 0.029 m/s^2 and 0.0005 rad/s per sample (the step over the root of 12). Times the root of the period, it is added to the phone's own
+// noise density.
 export const kPhoneImu = `sensor_type: imu
 comment: a phone's, as browsers deliver it
 T_BS:

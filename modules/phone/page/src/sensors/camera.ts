@@ -1,4 +1,4 @@
-// The back camera: images as they come, stamped on the page's clock.
+// The back camera: gives images as they come, with times on the page's clock.
 
 import type { CameraKind } from "./calibration";
 import { ArrivalClock, utimeOf } from "./clock";
@@ -7,12 +7,12 @@ import type { Luma } from "./luma";
 
 export interface CameraImage extends Luma {
   utime: number; // us
-  picture: ImageBitmap; // what to draw; whoever has the image closes it
+  picture: ImageBitmap; // for drawing; whoever has the image must close it
 }
 
-const kSettle_ms = 1500; // of focus and exposure, before they are locked
+const kSettle_ms = 1500; // time for focus and exposure to settle before they are locked
 
-// Not in TypeScript's library: Chromium's.
+// A class of Chromium that TypeScript's library lacks.
 declare class MediaStreamTrackProcessor {
   constructor(init: { track: MediaStreamTrack; maxBufferSize?: number });
   readonly readable: ReadableStream<VideoFrame>;
@@ -27,7 +27,7 @@ export class Camera {
     readonly video: HTMLVideoElement,
   ) {}
 
-  // Throws what the browser says: no camera, no permission.
+  // Throws the browser's error: no camera, no permission.
   static async open(): Promise<Camera> {
     const stream = await navigator.mediaDevices.getUserMedia({
       audio: false,
@@ -48,7 +48,7 @@ export class Camera {
     return this.stream.getVideoTracks()[0];
   }
 
-  // As it delivers images now.
+  // The camera as it delivers images now.
   get kind(): CameraKind {
     const { videoWidth: width, videoHeight: height } = this.video;
     return { label: this.track.label, width, height, angle_deg: screen.orientation?.angle ?? 0 };
@@ -59,7 +59,7 @@ export class Camera {
     for (const track of this.stream.getTracks()) track.stop();
   }
 
-  // What moves the focus changes the focal length. Browsers that cannot lock say so, and nothing is lost.
+  // Locks focus and exposure, because focusing changes the focal length. If the browser cannot lock them, they stay automatic.
   private async lock() {
     const can = (this.track.getCapabilities?.() ?? {}) as Record<string, unknown>;
     for (const mode of ["focusMode", "exposureMode"]) {
@@ -71,7 +71,7 @@ export class Camera {
   private async readTrack() {
     const clock = new ArrivalClock();
     const reader = new MediaStreamTrackProcessor({ track: this.track, maxBufferSize: 2 }).readable.getReader();
-    // To the stream's end, also after stop(): what waits in it has to be closed too.
+    // Reads to the end of the stream, also after stop(), because waiting frames must be closed too.
     for (;;) {
       const { value: frame, done } = await reader.read();
       if (done) return;
@@ -81,7 +81,7 @@ export class Camera {
     }
   }
 
-  // Safari and Firefox. captureTime is when the camera had it; without it there is the time of its presentation.
+  // For Safari and Firefox. captureTime is when the camera took the image; without it, the time of presentation is used.
   private readVideo() {
     let newest = 0;
     const next = async (now: number, { captureTime }: VideoFrameCallbackMetadata) => {
@@ -96,7 +96,7 @@ export class Camera {
     this.video.requestVideoFrameCallback(next);
   }
 
-  // The frame goes back to the camera at once: it has a few only, and gives no more while they are kept.
+  // The frame is returned to the camera at once, because the camera has only few frames and stops when all are kept.
   private async give(utime: number, frame: VideoFrame) {
     const taken = Promise.all([lumaOfFrame(frame), createImageBitmap(frame)]);
     const [luma, picture] = await taken.finally(() => frame.close());

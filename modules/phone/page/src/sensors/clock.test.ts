@@ -4,7 +4,7 @@ import { ArrivalClock } from "./clock";
 
 const kEpoch = 1_700_000_000_000_000;
 
-// A camera at 20 Hz whose stamps begin at 0, each arriving 30 to 60 ms later.
+// A camera at 20 Hz whose time stamps begin at 0; each image arrives 30 to 60 ms later.
 function arrivals(count: number, drift = 0) {
   return Array.from({ length: count }, (_, i) => {
     const stamp = i * 50_000;

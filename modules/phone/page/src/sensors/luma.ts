@@ -1,15 +1,15 @@
-// The grey image of what a camera or a decoder gives, as the agent takes it.
+// Converts images of a camera or a decoder to grey, as the agent needs them.
 
 export interface Luma {
   luma: Uint8Array;
   width: number;
   height: number;
-  stride: number; // bytes a row
+  stride: number; // bytes per row
 }
 
 const kPlanar = ["I420", "I420A", "NV12", "I422", "I444"]; // the first plane is the luma
 
-// Without a canvas where the frame has a luma plane.
+// Needs no canvas if the frame has a luma plane.
 export async function lumaOfFrame(frame: VideoFrame): Promise<Luma> {
   if (!frame.format || !kPlanar.includes(frame.format)) return lumaOfPicture(frame, frame.displayWidth, frame.displayHeight);
   const { width, height } = frame.visibleRect!;
@@ -24,7 +24,7 @@ export function lumaOfPicture(picture: CanvasImageSource, width: number, height:
   return { luma: lumaOfRgba(context.getImageData(0, 0, width, height).data), width, height, stride: width };
 }
 
-// BT.601, in 256ths. Grey stays exactly as it is.
+// Grey by BT.601, with factors in 256ths. A grey pixel keeps its exact value.
 export function lumaOfRgba(rgba: Uint8ClampedArray): Uint8Array {
   const luma = new Uint8Array(rgba.length / 4);
   for (let i = 0; i < luma.length; ++i) {
@@ -33,14 +33,14 @@ export function lumaOfRgba(rgba: Uint8ClampedArray): Uint8Array {
   return luma;
 }
 
-// The image's rows without what pads them to `stride`.
+// Copies the image's rows without the padding to `stride`.
 export function packRows(luma: Uint8Array, width: number, height: number, stride: number, into: Uint8Array) {
   for (let row = 0; row < height; ++row) {
     into.set(luma.subarray(row * stride, row * stride + width), row * width);
   }
 }
 
-// Of every 16th pixel of every 16th row.
+// The mean of every 16th pixel of every 16th row, 0 to 255.
 export function brightnessOf({ luma, width, height, stride }: Luma): number {
   let sum = 0;
   let count = 0;

@@ -1,4 +1,4 @@
-// The device's motion as inertial samples in the body frame, at the 60 Hz that browsers give.
+// Gives the device's motion as inertial samples in the body frame, at the 60 Hz of browsers.
 
 import type { ImuSample } from "../recording/euroc";
 import { GravitySign, toBody, upInBody } from "./axes";
@@ -7,7 +7,7 @@ import { utimeOf } from "./clock";
 
 const kSilence_ms = 3000;
 
-// Some browsers ask their user, iOS only within a tap. What comes of it is seen by whether motion comes.
+// Some browsers ask the user for permission; iOS only allows asking within a tap. The answer is not used: motion comes or not.
 type Asking = { requestPermission?: () => Promise<PermissionState> };
 
 export async function askForMotion(): Promise<void> {
@@ -25,7 +25,7 @@ export class Motion {
 
   constructor(
     private readonly onSample: (sample: ImuSample) => void,
-    onSilence: () => void, // nothing came
+    onSilence: () => void, // called if no motion comes
   ) {
     addEventListener("devicemotion", this.onMotion);
     addEventListener("deviceorientation", this.onOrientation);

@@ -1,5 +1,5 @@
-// Which camera images the agent gets. One is with it, at most one waits; a newer one takes the place of the waiting one.
-// So a phone that slows down sees fewer images, and never old ones.
+// Decides which camera images the agent gets. The agent has one, and at most one waits; a newer image replaces the waiting one. So a
+// slow phone processes fewer images, but never old ones.
 
 interface Stamped {
   utime: number;
@@ -10,7 +10,7 @@ export class NewestFrame<F extends Stamped> {
   private waiting?: F;
   private atAgent = false;
 
-  // `give` hands a frame to the agent, `drop` frees one.
+  // `give` passes a frame to the agent, `drop` frees one.
   constructor(
     private readonly give: (frame: F) => void,
     private readonly drop: (frame: F) => void,
@@ -25,7 +25,7 @@ export class NewestFrame<F extends Stamped> {
     this.next();
   }
 
-  // The agent is done with the one it had.
+  // The agent has processed its frame.
   done() {
     this.atAgent = false;
     this.next();

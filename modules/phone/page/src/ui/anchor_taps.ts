@@ -1,4 +1,4 @@
-// Taps on the camera's image: they place an anchor, or ask about the one that they hit.
+// Taps on the camera's image: a tap places an anchor, or opens the dialog of the anchor that it hits.
 
 import { askDialog, byId } from "../dom";
 import type { Stage } from "../view/stage";
@@ -6,7 +6,7 @@ import type { Walk } from "../walk";
 
 const kTapRadius = 36; // CSS pixels around an anchor
 
-// `current`: the walk, which may be another one when a dialog is closed. `ownerName`: nothing for the visitor's own.
+// `current` returns the current walk, which may have changed when a dialog closes. `ownerName`: undefined for the visitor's own.
 export async function onTap(
   x: number, y: number, current: () => Walk | undefined, stage: Stage, ownerName: (owner: number) => string | undefined,
 ) {

@@ -6,10 +6,10 @@ import type { CalibrationWalk } from "../calibration/calibration_walk";
 import type { LinkState } from "../messages";
 
 export interface Situation {
-  pose?: AgentPose; // the newest
+  pose?: AgentPose; // the newest one
   brightness: number; // of the newest image, 0 to 255
-  link?: LinkState; // nothing: the agent runs by itself
-  together: string[]; // names of those whose map is one with this
+  link?: LinkState; // undefined: the agent runs without a server
+  together: string[]; // names of the people whose map is fused with this one
   motionSilent: boolean;
 }
 
@@ -39,7 +39,7 @@ export function hintOf({ pose, brightness, link, together, motionSilent }: Situa
   return { text: "Tracking.", tone: "good" };
 }
 
-// While an unknown camera is calibrated. `missing` as of CalibrationProgress, about the camera's axes.
+// The hint while an unknown camera is calibrated. CalibrationProgress.missing is about the camera's axes.
 export function calibrationHint(situation: Pick<CalibrationWalk, "progress" | "refused" | "brightness" | "motionSilent">): Hint {
   const { progress: { share, missing }, refused, brightness, motionSilent } = situation;
   if (motionSilent) return { text: kNoMotion, tone: "bad" };

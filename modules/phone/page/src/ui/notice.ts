@@ -1,4 +1,4 @@
-// What went wrong, or was done, for a few seconds.
+// Shows for a few seconds what went wrong or was done.
 
 import { byId } from "../dom";
 

@@ -1,4 +1,4 @@
-// What lies over the camera's image: the hint, a calibration's ring, tracking quality and numbers, the small map.
+// The panels over the camera's image: the hint, the calibration's ring, tracking quality and numbers, the small map.
 
 import type { AgentPose } from "../agent/phone_agent";
 import { byId } from "../dom";
@@ -37,7 +37,7 @@ export class Panels {
     this.imagesBefore = this.rate_hz = 0;
     document.documentElement.classList.toggle("xr", usesXr);
     byId("hint").hidden = byId("bar").hidden = false;
-    byId("record").hidden = !isLive || !walk || usesXr; // an image without motion is no recording
+    byId("record").hidden = !isLive || !walk || usesXr; // images without motion data are not a recording
     byId("skip").hidden = skipCalibration === undefined;
     if (usesXr && !walk) this.showHint({ text: "Move the phone slowly, so that AR finds its way.", tone: "do" });
   }
@@ -84,7 +84,7 @@ export class Panels {
     byId("hint").className = tone;
   }
 
-  // Whose maps are one with this one, as far as the agent is told: those who are there now first.
+  // The people whose maps are fused with this one, as far as the agent knows; those who are present come first.
   private together(): string[] {
     const { pose, anchors, others } = this.visit.walk!;
     const present = pose ? others.in(pose.map, performance.now()).map(({ agent }) => agent) : [];

@@ -1,12 +1,12 @@
-// The way that was walked, from above, with the anchors and the others: in the odom frame, so that nothing jumps.
+// A map of the path from above, with the anchors and the others. It is in the odom frame, so that nothing jumps.
 
 import { Matrix4, Vector3 } from "three";
 import type { AgentPose, OtherAgent, ShownAnchor } from "../agent/phone_agent";
 import { matrixOf } from "../view/poses";
 
-const kStep_m = 0.1; // of the way, between points that are kept
+const kStep_m = 0.1; // distance between points of the path that are kept
 const kMaxPoints = 3000;
-const kSmallest_m = 4; // across
+const kSmallest_m = 4; // smallest width of the map
 const kSelf = 22; // size, pixels of the canvas
 const kOther = 16;
 
@@ -16,7 +16,7 @@ export class SmallMap {
 
   constructor(private readonly canvas: HTMLCanvasElement) {}
 
-  // `T_body_cam` tells where the camera looks.
+  // `T_body_cam` gives the direction of the camera.
   draw(
     pose: AgentPose, T_body_cam: Matrix4, anchors: ShownAnchor[], others: OtherAgent[], colourOf: (owner: number) => string, self: number,
   ) {
@@ -65,7 +65,7 @@ export class SmallMap {
   }
 }
 
-// Where somebody is, and looks.
+// Draws the position and viewing direction of somebody.
 function drawCamera(
   context: CanvasRenderingContext2D, T_odom_cam: Matrix4, place: (p: { x: number; y: number }) => [number, number], radius: number,
 ) {

@@ -1,4 +1,4 @@
-// Before a walk: who the visitor is, or joins as.
+// The panel before a walk: who the visitor is, and joining.
 
 import { byId } from "../dom";
 import { codeIn, forgetMembership, join, storedMembership } from "../link/join";
@@ -23,12 +23,12 @@ export class Welcome {
     this.show();
   }
 
-  // Joins, where an invite code was given.
+  // Joins if an invite code was given.
   async admit(): Promise<Membership | undefined> {
     const code = codeField().value.trim();
     if (code !== "") {
       this.membership = await join(code, byId<HTMLInputElement>("name").value.trim());
-      // The code works once: a page that is loaded again must not offer it.
+      // The code works only once, so a reloaded page must not offer it again.
       history.replaceState(null, "", location.pathname);
       codeField().value = "";
     }

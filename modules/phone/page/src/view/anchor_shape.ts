@@ -1,5 +1,5 @@
-// An anchor as it is drawn: a diamond that stands on it, of a real size, so that it looks near or far. In the anchor's frame,
-// metres, z up.
+// The shape of a drawn anchor: a diamond that stands on it. It has a fixed size in metres, so that it looks near or far. In the
+// anchor's frame, metres, z up.
 
 import { Vector3 } from "three";
 

@@ -38,7 +38,7 @@ test("what is missing is named", () => {
   refused("", /no list of fields/);
 });
 
-// By OpenCV: cv2.fisheye.projectPoints and cv2.projectPoints.
+// The expected values are from OpenCV: cv2.fisheye.projectPoints and cv2.projectPoints.
 test("projects as OpenCV does", () => {
   const p = new Vector3(0.6, -0.4, 1.5);
   const near = (pixel: [number, number] | undefined, u: number, v: number) =>

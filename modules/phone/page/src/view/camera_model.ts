@@ -1,5 +1,5 @@
-// The camera of a sensor.yaml, as far as drawing needs it: where a point of the camera frame is in the image. Formulas and
-// conventions are those of core/camera_model.h: z forward, x right, y down; the centre of the top-left pixel is (0, 0).
+// The camera model of a sensor.yaml, only for drawing: it projects points of the camera frame. Formulas and conventions are those of
+// core/camera_model.h: z forward, x right, y down; the centre of the top-left pixel is (0, 0).
 
 import { Matrix4 } from "three";
 import { parse } from "yaml";
@@ -24,20 +24,20 @@ function numbers(fields: Fields, file: string, key: string, count: number): numb
 }
 
 function parseFields(text: string, file: string): Fields {
-  // Kalibr's and OpenCV's files may begin with %YAML:1.0, which is not YAML.
+  // Files of Kalibr and OpenCV may begin with %YAML:1.0, which is not valid YAML.
   const fields: unknown = parse(text.replace(/^%YAML[^\n]*\n/, ""));
   if (typeof fields !== "object" || fields === null) throw new Error(`${file}: this is no list of fields`);
   return fields as Fields;
 }
 
-// T_BS, camera or IMU in the rig's frame.
+// The T_BS of a camera or IMU: from the sensor to the rig's frame.
 export function parseExtrinsics(text: string, file: string): Matrix4 {
   const T_BS = parseFields(text, file).T_BS;
   if (typeof T_BS !== "object" || T_BS === null) throw new Error(`${file}: field 'T_BS' is missing`);
   return new Matrix4().set(...(numbers(T_BS as Fields, file, "data", 16) as Parameters<Matrix4["set"]>));
 }
 
-// `T_rig_body`: the IMU in the rig's frame.
+// `T_rig_body`: T_BS of the IMU.
 export function parseCamera(text: string, file: string, T_rig_body = new Matrix4()): CameraModel {
   const fields = parseFields(text, file);
   const model = fields.distortion_model;
@@ -55,9 +55,9 @@ export function parseCamera(text: string, file: string, T_rig_body = new Matrix4
   };
 }
 
-const kMaxAngle = 1.3; // rad off the axis: beyond it a distortion polynomial may fold back
+const kMaxAngle = 1.3; // rad from the axis; beyond it a distortion polynomial may fold back
 
-// Pixel of a point of the camera frame; nothing behind the camera, or too far off its axis.
+// The pixel of a point of the camera frame; undefined behind the camera, or too far from its axis.
 export function project(camera: CameraModel, p_cam: { x: number; y: number; z: number }): [number, number] | undefined {
   if (p_cam.z <= 1e-6) return undefined;
   const [x, y] = [p_cam.x / p_cam.z, p_cam.y / p_cam.z];

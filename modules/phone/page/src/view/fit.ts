@@ -1,4 +1,4 @@
-// Where an image's pixels are on the screen: the image covers the view, and what does not fit is cut off evenly.
+// Maps an image's pixels to the screen and back. The image covers the view; what does not fit is cut off evenly on both sides.
 
 export interface Size {
   width: number;
@@ -6,7 +6,7 @@ export interface Size {
 }
 
 export class Fit {
-  readonly scale: number; // pixels of the screen for one of the image
+  readonly scale: number; // screen pixels per image pixel
   private readonly left: number;
   private readonly top: number;
 
@@ -16,7 +16,7 @@ export class Fit {
     this.top = (view.height - this.scale * image.height) / 2;
   }
 
-  // The centre of the first pixel is (0, 0) in the image; the corner of the view is on the screen.
+  // (0, 0) is the centre of the first pixel in the image, but the corner of the view on the screen.
   toScreen([u, v]: [number, number]): [number, number] {
     return [this.left + this.scale * (u + 0.5), this.top + this.scale * (v + 0.5)];
   }

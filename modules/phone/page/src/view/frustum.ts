@@ -1,5 +1,5 @@
-// Somebody's camera as it is drawn: the edges of a small frustum, with a mark on its upper side. In the camera's frame, metres:
-// z forward, x right, y down.
+// The shape of another person's camera: the edges of a small frustum, with a mark on its upper side. In the camera's frame, metres: z
+// forward, x right, y down.
 
 import { Vector3 } from "three";
 

@@ -8,7 +8,7 @@ import type { Thing } from "./overlay";
 
 const camera = parseCamera(roughCalibration({ label: "", width: 480, height: 640, angle_deg: 0 }), "rough");
 const half = Math.SQRT1_2;
-// Held upright at (1, 2, 1.5), its back camera to odom's +y: the body's y is up, its z to -y.
+// The phone is held upright at (1, 2, 1.5) and its back camera looks along odom's +y: the body's y is up, its z is -y.
 const pose: AgentPose = {
   utime: 1, state: "tracking", reason: "", map: "1/1", fused: false, numTracked: 100,
   T_odom_body: [1, 2, 1.5, half, 0, 0, half],

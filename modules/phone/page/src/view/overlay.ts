@@ -1,5 +1,5 @@
-// Anchors and other people's cameras over the camera image. Every corner goes through the camera's own lens model, so that what is
-// drawn lies where the image has it; three.js draws what comes out in pixels of the screen, nearer things in front.
+// Draws anchors and other people's cameras over the camera image. Every corner is projected with the camera's own lens model, so that
+// it is at the right place in the image. three.js then draws in screen pixels, nearer things in front.
 
 import {
   BufferAttribute, BufferGeometry, Color, DynamicDrawUsage, Matrix4, Mesh, MeshBasicMaterial, OrthographicCamera, Scene, Vector3,
@@ -15,7 +15,7 @@ import { kFrustumEdges } from "./frustum";
 import { matrixOf } from "./poses";
 
 const kFar_m = 200;
-const kMaxThings = 200; // the nearest
+const kMaxThings = 200; // only the nearest are drawn
 const kEdge_px = 3;
 const kVertices = Math.max(3 * kAnchorFaces.length, 6 * kFrustumEdges.length);
 
@@ -23,14 +23,14 @@ export interface Thing {
   name: string;
   owner: number;
   T_odom_thing: Pose7;
-  id?: string; // of an anchor; without it, it is a person's camera
+  id?: string; // the anchor's id; undefined: a person's camera
 }
 
 export interface DrawnThing {
   id?: string;
   name: string;
   owner: number;
-  pixel: [number, number]; // of the image
+  pixel: [number, number]; // in the image
   distance_m: number;
 }
 
@@ -38,7 +38,7 @@ interface Seen extends DrawnThing {
   T_cam_thing: Matrix4;
 }
 
-// Things whose origin is before the camera, nearest first; off the image too.
+// The things whose origin is in front of the camera, nearest first, also those outside the image.
 export function thingsBefore(camera: CameraModel, pose: AgentPose, things: Thing[]): Seen[] {
   const T_cam_odom = matrixOf(pose.T_odom_body).multiply(camera.T_body_cam).invert();
   const seen = things.flatMap(({ T_odom_thing, ...thing }) => {
@@ -50,7 +50,7 @@ export function thingsBefore(camera: CameraModel, pose: AgentPose, things: Thing
   return seen.sort((a, b) => a.distance_m - b.distance_m).slice(0, kMaxThings);
 }
 
-type Point = [number, number, number]; // pixels of the screen, and depth
+type Point = [number, number, number]; // screen pixels and depth
 
 export class Overlay {
   readonly renderer: WebGLRenderer;
@@ -60,7 +60,7 @@ export class Overlay {
   private readonly positions = this.attribute("position");
   private readonly colours = this.attribute("color");
   private readonly labels: HTMLElement[] = [];
-  private isClear = true; // nothing is drawn: then a frame costs nothing
+  private isClear = true; // nothing is drawn, so that the next frame without things costs nothing
 
   constructor(canvas: HTMLCanvasElement, private readonly labelParent: HTMLElement) {
     this.renderer = new WebGLRenderer({ canvas, alpha: true, antialias: true });
@@ -72,14 +72,14 @@ export class Overlay {
   resize({ width, height }: Size) {
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.renderer.setSize(width, height, false);
-    // Pixels of the screen, y down; farther away is deeper.
+    // Coordinates are screen pixels, y down, and the distance as depth.
     this.camera.left = this.camera.top = 0;
     [this.camera.right, this.camera.bottom] = [width, height];
     [this.camera.near, this.camera.far] = [0, kFar_m];
     this.camera.updateProjectionMatrix();
   }
 
-  // Into the canvas, or into `target`, which is empty before.
+  // Draws into the canvas, or into `target`, which must be empty.
   draw(camera: CameraModel, fit: Fit, seen: Seen[], colourOf: (owner: number) => string, target?: WebGLRenderTarget) {
     if (seen.length === 0) return this.clear();
     this.isClear = false;
@@ -118,7 +118,7 @@ export class Overlay {
     return n;
   }
 
-  // Lines as thin rectangles: those of a graphics card are one pixel wide.
+  // Draws lines as thin rectangles, because lines of a graphics card are only one pixel wide.
   private addFrustum(toScreen: (corner: Vector3) => Point | undefined, colour: Color, n: number): number {
     for (const edge of kFrustumEdges) {
       const [a, b] = edge.map(toScreen);

@@ -1,4 +1,4 @@
-// The agent's seven numbers as matrices.
+// Converts the agent's poses (seven numbers) to matrices.
 
 import { Matrix4, Quaternion, Vector3 } from "three";
 import type { Pose7 } from "../agent/phone_agent";

@@ -1,5 +1,5 @@
-// The camera image over the whole screen, with what belongs onto it. An image is shown when its pose is known, so that anchors
-// stand still in it: a tenth of a second late at most, and nobody looks past the phone to notice.
+// The camera image over the whole screen, with the things drawn on it. An image is shown when its pose is known, so that anchors do
+// not move in it. It is then a tenth of a second late at most, which nobody notices without looking past the phone.
 
 import type { WebGLRenderTarget } from "three";
 import type { AgentPose, OtherAgent, ShownAnchor } from "../agent/phone_agent";
@@ -8,7 +8,7 @@ import { Fit } from "./fit";
 import { Overlay, thingsBefore } from "./overlay";
 import type { DrawnThing } from "./overlay";
 
-const kMaxWaiting = 4; // pictures whose pose has not come
+const kMaxWaiting = 4; // pictures without pose yet
 
 export interface Drawn {
   utime: number; // of the image that is shown
@@ -33,19 +33,19 @@ export class Stage {
     this.resize();
   }
 
-  // The agent has the image of `utime`.
+  // Keeps the picture of an image that the agent is processing.
   keep(utime: number, picture: ImageBitmap) {
     this.waiting.set(utime, picture);
     const [oldest] = this.waiting.keys();
     if (this.waiting.size > kMaxWaiting) this.forget(oldest);
   }
 
-  // Shows the picture of the pose. Nothing when it is not there any more.
+  // Shows the picture of the pose, if it is still there.
   show(camera: CameraModel, pose: AgentPose, anchors: ShownAnchor[], others: OtherAgent[]) {
     if (this.present(pose.utime)) this.draw(camera, pose, anchors, others);
   }
 
-  // The device shows its camera's image by itself; what lies over it goes into `target`.
+  // For a device that shows its camera's image itself: draws only the things, into `target`.
   showThrough(camera: CameraModel, pose: AgentPose, anchors: ShownAnchor[], others: OtherAgent[], target: WebGLRenderTarget) {
     this.draw(camera, pose, anchors, others, target);
   }
@@ -65,7 +65,7 @@ export class Stage {
     };
   }
 
-  // A picture whose pose nobody knows.
+  // Shows a picture that has no pose.
   showAlone(utime: number) {
     this.present(utime);
   }
@@ -80,13 +80,13 @@ export class Stage {
     return true;
   }
 
-  // The pixel of the shown image at a place of the screen; nothing outside.
+  // The pixel of the shown image at a position on the screen; undefined outside the image.
   pixelAt(camera: CameraModel, x: number, y: number): [number, number] | undefined {
     const [u, v] = this.onScreen(camera).toPixel([x, y]);
     return u >= 0 && v >= 0 && u <= camera.width - 1 && v <= camera.height - 1 ? [u, v] : undefined;
   }
 
-  // Where a pixel of the shown image is on the screen.
+  // The position of a pixel of the shown image on the screen.
   screenOf(camera: CameraModel, pixel: [number, number]): [number, number] {
     return this.onScreen(camera).toScreen(pixel);
   }
@@ -98,7 +98,7 @@ export class Stage {
     this.canvas.getContext("2d")!.clearRect(0, 0, this.canvas.width, this.canvas.height);
   }
 
-  // In CSS pixels; the canvas has more.
+  // In CSS pixels, which are larger than those of the canvas.
   private onScreen(camera: CameraModel): Fit {
     return new Fit(camera, { width: this.canvas.clientWidth, height: this.canvas.clientHeight });
   }

@@ -1,9 +1,9 @@
-// The camera's texture on the graphics card as a grey image in memory: the one place where something is read back. The card makes it
-// grey, smaller and upright, four pixels in one; it is fetched when the card is done, frames later, so that nobody waits for it.
+// Reads the camera's texture from the graphics card as a grey image. The card makes it grey, smaller and upright, and packs four pixels
+// into one. It is fetched frames later, when the card is done, so that nothing waits for it.
 
 import type { Size } from "../view/fit";
 
-const kPixels = 640 * 480; // about as many, in the shape of the camera's image
+const kPixels = 640 * 480; // approximate size of the grey image, with the camera's aspect ratio
 
 const kVertexShader = `#version 300 es
 void main() {
@@ -11,7 +11,7 @@ void main() {
   gl_Position = vec4(4.0 * corner - 1.0, 0.0, 1.0);
 }`;
 
-// BT.601, in 256ths, as in sensors/luma.ts. The texture's first row is the lowest of the image.
+// Grey by BT.601 in 256ths, as in sensors/luma.ts. The texture's first row is the lowest one of the image.
 const kFragmentShader = `#version 300 es
 precision highp float;
 uniform sampler2D image;
@@ -33,7 +33,7 @@ void main() {
   four = vec4(grey(pixel), grey(pixel + vec2(1.0, 0.0)), grey(pixel + vec2(2.0, 0.0)), grey(pixel + vec2(3.0, 0.0)));
 }`;
 
-// Of the grey image: whole fours of pixels in a row.
+// The size of the grey image. Its width is a multiple of four.
 export function greySizeOf({ width, height }: Size): Size {
   const scale = Math.min(1, Math.sqrt(kPixels / (width * height)));
   return { width: Math.max(4, 4 * Math.round((scale * width) / 4)), height: Math.max(1, Math.round(scale * height)) };
@@ -63,7 +63,7 @@ export class CameraReadback {
     return this.pending !== undefined;
   }
 
-  // Changes the state of the context, which its owner resets afterwards.
+  // Starts reading an image. It changes the state of the WebGL context, which the owner must reset afterwards.
   start(texture: WebGLTexture, camera: Size) {
     const { gl } = this;
     const size = greySizeOf(camera);
@@ -96,7 +96,7 @@ export class CameraReadback {
     if (done) this.pending = { done, size };
   }
 
-  // The image that was started, once, when it is there.
+  // Returns the started image once, when it is ready.
   take(): { luma: Uint8Array; size: Size } | undefined {
     const { gl, pending } = this;
     if (!pending || gl.clientWaitSync(pending.done, 0, 0) === gl.TIMEOUT_EXPIRED) return undefined;

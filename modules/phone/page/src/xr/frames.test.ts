@@ -14,7 +14,7 @@ test("up is z, and forward is x", () => {
   near(new Vector3(0, 0, -1).transformDirection(T), new Vector3(1, 0, 0), 1e-12);
 });
 
-// A camera somewhere, with a principal point that is not in the middle: a point is in the image where three.js has it on the screen.
+// For any camera, also with a principal point off the middle, a point must be in the image where three.js has it on the screen.
 test("a point of the world is at the pixel where WebXR draws it", () => {
   const view = new PerspectiveCamera(60, 0.75, 0.1, 100);
   view.setViewOffset(1000, 1300, 20, 40, 900, 1200);

@@ -1,8 +1,8 @@
-// What TypeScript's types of WebXR lack: the Raw Camera Access Module (https://immersive-web.github.io/raw-camera-access/).
+// Types that TypeScript's WebXR types lack: the Raw Camera Access Module (https://immersive-web.github.io/raw-camera-access/).
 
 export {};
 
-// And what three.js' types lack: a framebuffer in place of a target's own.
+// A function that the types of three.js lack: it replaces a target's own framebuffer.
 declare module "three" {
   interface WebGLRenderer {
     setRenderTargetFramebuffer(target: import("three").WebGLRenderTarget, framebuffer: WebGLFramebuffer): void;

@@ -1,5 +1,5 @@
-// The device's own odometry (ARCore, in Chrome on Android) by WebXR: a session of immersive-ar in which each frame has a pose, and,
-// by camera-access, the image that belongs to it. It shows the camera's image by itself, and the page over it (dom-overlay).
+// The device's own odometry (ARCore, in Chrome on Android) by WebXR: an immersive-ar session in which each frame has a pose and, by
+// camera-access, the image that belongs to it. The session shows the camera's image itself, and the page over it (dom-overlay).
 
 import type { WebGLRenderer } from "three";
 import { WebGLRenderTarget } from "three";
@@ -10,8 +10,8 @@ import type { Size } from "../view/fit";
 import { CameraReadback, greySizeOf } from "./camera_readback";
 import { cameraYamlOf, odomPose } from "./frames";
 
-const kImageInterval_ms = 95; // features are followed from image to image: ten of them a second
-const kNoCamera_ms = 5000; // with poses
+const kImageInterval_ms = 95; // about ten images per second, so that features can be tracked between them
+const kNoCamera_ms = 5000; // longest time with poses but without camera images
 
 export interface XrImage extends Luma {
   utime: number;
@@ -21,28 +21,28 @@ export interface XrImage extends Luma {
 // A frame that is about to be shown.
 export interface XrFrame {
   T_odom_body: Pose7;
-  target: WebGLRenderTarget; // what is drawn into it lies over the camera's image
+  target: WebGLRenderTarget; // drawn over the camera's image
 }
 
 export class XrOdometry {
   onImage?: (image: XrImage) => void;
   onFrame?: (frame: XrFrame) => void;
-  onCamera?: (cameraYaml: string) => void; // before the first image, and when the screen was rotated
-  onEnd?: () => void; // of the session, or without images
+  onCamera?: (cameraYaml: string) => void; // called before the first image and when the screen was rotated
+  onEnd?: () => void; // the session has ended, or gives no images
   private readonly readback: CameraReadback;
   private readonly binding: XRWebGLBinding;
   private readonly target: WebGLRenderTarget;
   private size?: Size; // of images
-  private started?: Omit<XrImage, keyof Luma>; // of the image that is being read back
-  private newest_ms = -Infinity; // when an image was begun
-  private blindSince_ms?: number; // poses, but no camera
+  private started?: Omit<XrImage, keyof Luma>; // time and pose of the image that is being read back
+  private newest_ms = -Infinity; // when the last image was started
+  private blindSince_ms?: number; // since when there are poses but no camera images
   private ended = false;
 
   static async isSupported(): Promise<boolean> {
     return (await navigator.xr?.isSessionSupported("immersive-ar").catch(() => false)) ?? false;
   }
 
-  // Within a tap. Throws what the browser says: no camera images, no permission.
+  // Must be called within a tap. Throws the browser's error: no camera images, no permission.
   static async open(renderer: WebGLRenderer, root: HTMLElement): Promise<XrOdometry> {
     const session = await navigator.xr!.requestSession("immersive-ar", {
       requiredFeatures: ["camera-access", "dom-overlay"],
@@ -75,7 +75,7 @@ export class XrOdometry {
     session.addEventListener("end", () => this.end());
   }
 
-  // Once who listens is there.
+  // Call it after the callbacks are set.
   start() {
     this.session.requestAnimationFrame(this.onAnimationFrame);
   }
