@@ -1,5 +1,5 @@
-// Colours that those who see few of them can tell apart: Okabe and Ito's, with four of Paul Tol's after
-// them. Twelve are more than hue alone can carry, so every agent also wears its number.
+// Colours that colour-blind people can distinguish: those of Okabe and Ito, then four of Paul Tol's. Twelve agents
+// cannot be distinguished by hue alone, so every agent also shows its number.
 
 const light = [
   "#0072b2", "#d98200", "#009e73", "#b8578c", "#3795cf", "#c44e00",
@@ -15,7 +15,7 @@ const wantsDark = matchMedia("(prefers-color-scheme: dark)");
 const isDark = () => wantsDark.matches;
 export const onThemeChange = (then: () => void) => wantsDark.addEventListener("change", then);
 
-// Agents are numbered from 1; beyond twelve the colours come round again.
+// Agents are numbered from 1; after twelve, the colours repeat.
 export function agentColour(agent: number): string {
   const colours = isDark() ? dark : light;
   return colours[(Math.max(agent, 1) - 1) % colours.length];

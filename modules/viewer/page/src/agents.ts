@@ -1,5 +1,5 @@
-// What is drawn of one agent: its camera, the tail from its newest keyframe to where it is, the ellipse
-// of its uncertainty, its number.
+// Draws one agent: its camera, its path since the newest keyframe (the tail), the ellipse of its uncertainty,
+// and its number.
 
 import {
   BufferAttribute, BufferGeometry, Camera, Group, Line, LineBasicMaterial, LineLoop, LineSegments, Matrix4, Vector3,
@@ -8,9 +8,9 @@ import { Keyframe, Pose } from "./model";
 import { agentColour } from "../../../web/page/palette";
 import type { AgentSaid } from "./protocol";
 
-// 95 % of a two-dimensional Gaussian lie within this many standard deviations.
+// 95 % of a two-dimensional Gaussian are within this many standard deviations.
 const kEllipse95 = 2.4477;
-const kTail = 400; // poses of an agent since its newest keyframe
+const kTail = 400; // largest number of poses in the tail
 const kFrustumDepth = 0.6; // metres
 
 export class AgentDrawing {
@@ -21,8 +21,8 @@ export class AgentDrawing {
   private readonly tail: Line;
   private trail: Vector3[] = []; // in the odom frame of `map`
   private map = -1;
-  private tailOf?: Keyframe; // what the tail was made from
-  private view = ""; // what the frustum was made of
+  private tailOf?: Keyframe; // the keyframe at which the tail begins
+  private view = ""; // the view from which the frustum was made
 
   constructor(private agent: AgentSaid, labels: HTMLElement) {
     const material = new LineBasicMaterial({ color: agentColour(agent.id) });
@@ -57,7 +57,7 @@ export class AgentDrawing {
     this.tailOf = undefined;
   }
 
-  // The agent has said where it is.
+  // Takes the agent's newest state.
   take(agent: AgentSaid) {
     this.agent = agent;
     const view = String(agent.view);
@@ -80,7 +80,7 @@ export class AgentDrawing {
     this.label.hidden = true;
   }
 
-  // `pose`: the agent's on the stage; `newest`: the newest keyframe of its map.
+  // `pose`: the agent's pose on the stage; `newest`: the newest keyframe of its map.
   place(pose: Pose, newest: Keyframe, ellipseScale: number) {
     this.group.visible = true;
     this.frustum.matrix.copy(pose.times(Pose.of(this.agent.T_body_cam)).matrix());
@@ -100,7 +100,7 @@ export class AgentDrawing {
     const c = this.agent.covariance_m2;
     this.ellipse.visible = c !== undefined && ellipseScale > 0;
     if (!c) return;
-    // Cholesky: [xx xy; xy yy] = L L^T, and L takes the unit circle to the ellipse.
+    // Cholesky: [xx xy; xy yy] = L L^T, and L maps the unit circle to the ellipse.
     const scale = kEllipse95 * ellipseScale;
     const a = Math.sqrt(c[0]);
     const b = c[1] / a;
@@ -113,8 +113,8 @@ export class AgentDrawing {
     ));
   }
 
-  // From where odometry passed the newest keyframe. In the odom frame: as long as the agent says nothing
-  // new, a solve that moves its map moves the tail's matrix alone.
+  // The tail begins where the odometry passed the newest keyframe. It is in the odom frame, so an optimisation
+  // that moves the map only changes the tail's matrix.
   private makeTail(newest: Keyframe) {
     this.tailOf = newest;
     let from = 0;

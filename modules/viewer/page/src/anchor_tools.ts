@@ -1,5 +1,5 @@
-// What people do with anchors: the list, placing one, dragging, deleting. The server is asked, and the page shows
-// what it answers.
+// The tools for anchors: the list, placing, dragging, deleting. The page asks the server for a change, and shows
+// what the server answers.
 
 import { Vector3 } from "three";
 import type { Connection } from "./connection";
@@ -10,12 +10,12 @@ import type { Stage } from "./stage";
 
 const kMaxListed = 200;
 const kMaxNameBytes = 100; // as messages carry
-const kClickPixels = 4; // of a pointer that did not mean to drag
-const kSure_ms = 3000; // to press again
+const kClickPixels = 4; // a shorter movement of the pointer is a click and not a drag
+const kSure_ms = 3000; // time in which delete must be pressed again
 
 const fits = (name: string) => new TextEncoder().encode(name).length <= kMaxNameBytes;
 
-// Printable, of at most as many bytes as a message carries.
+// The text as a name: without control characters, and cut to kMaxNameBytes.
 export function nameOf(text: string): string {
   const name = [...text.replace(/[\u0000-\u001f\u007f]/g, " ").trim()];
   while (!fits(name.join(""))) name.pop();
@@ -39,7 +39,7 @@ export class AnchorTools {
   ) {
     byId("anchor_add").onclick = () => this.place(!this.placing);
     byId("anchors").onclick = ({ target }) => this.pressed(target as HTMLElement);
-    // Before the camera's own controls hear of it.
+    // Capturing: called before the controls of the camera.
     canvas.addEventListener("pointerdown", (event) => this.pointerDown(event), { capture: true });
     canvas.addEventListener("pointermove", (event) => this.pointerMove(event));
     canvas.addEventListener("pointerup", (event) => this.pointerUp(event));
@@ -92,7 +92,7 @@ export class AnchorTools {
     }
   }
 
-  // What is deleted stays so: asked twice.
+  // Deleting cannot be undone, so the button must be pressed twice.
   private delete(button: HTMLElement, said: AnchorSaid) {
     if (button.dataset.sure) {
       this.connection.say({ anchor_delete: { anchor: said.id } });
@@ -128,7 +128,7 @@ export class AnchorTools {
     this.canvas.setPointerCapture(pointerId);
   }
 
-  // In the plane that faces the camera; with Shift along the ground.
+  // Drags in the plane that faces the camera; with Shift, along the ground.
   private pointerMove({ offsetX, offsetY, shiftKey }: PointerEvent) {
     if (!this.drag || !this.down) return;
     this.drag.moved ||= Math.hypot(offsetX - this.down.x, offsetY - this.down.y) > kClickPixels;
@@ -160,7 +160,7 @@ export class AnchorTools {
 
   private sayMoved(index: number) {
     const anchor = this.model.anchors.get(index);
-    if (!anchor?.moved) return; // deleted, or told anew, meanwhile
+    if (!anchor?.moved) return; // it was deleted or changed meanwhile
     const { t } = anchor.moved.T_holder_anchor;
     this.connection.say({
       anchor_move: { anchor: anchor.said.id, keyframe: anchor.holder, p_body: [t.x, t.y, t.z] },
@@ -192,7 +192,7 @@ function makeRow(): HTMLElement {
   return row;
 }
 
-// Nothing: cancelled.
+// Asks for a name; undefined if cancelled.
 function askName(): Promise<string | undefined> {
   const dialog = byId<HTMLDialogElement>("anchor_dialog");
   const input = byId<HTMLInputElement>("anchor_name");

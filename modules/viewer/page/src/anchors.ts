@@ -1,5 +1,5 @@
-// What is drawn of anchors: a marker of the same size on the screen however far it is, its name, and the axes of
-// the chosen one.
+// Draws the anchors: a marker with the same size on the screen at any distance, the name, and the axes of the
+// chosen anchor.
 
 import {
   AxesHelper, Camera, Color, DynamicDrawUsage, Group, InstancedMesh, Matrix4, MeshBasicMaterial, OctahedronGeometry,
@@ -8,9 +8,9 @@ import {
 import type { Pose } from "./model";
 import { colours } from "../../../web/page/palette";
 
-const kMarkerSize = 0.009; // of the distance to the camera
+const kMarkerSize = 0.009; // share of the distance to the camera
 const kAxesSize = 0.06;
-const kMaxLabels = 100; // names of the nearest; of more none could be read
+const kMaxLabels = 100; // only the nearest anchors show their names; more would not be readable
 
 interface PlacedAnchor {
   index: number;

@@ -1,5 +1,5 @@
-// Buffers on the graphics card that grow as points and lines arrive; what is there is not sent
-// again.
+// Buffers on the graphics card that grow as points and lines arrive. Data that are already there
+// are not sent again.
 
 import {
   BufferAttribute, BufferGeometry, InstancedBufferAttribute, InstancedBufferGeometry, Mesh, Points,
@@ -73,7 +73,7 @@ export class PointCloud {
     this.object.geometry.setDrawRange(0, this.growing.count);
   }
 
-  // Of each point its keyframe and where it is in that one's body frame.
+  // Calls `take` for each point, with its keyframe and its position in that keyframe's body frame.
   forEach(take: (keyframe: number, x: number, y: number, z: number) => void) {
     const { position, keyframe } = this.object.geometry.attributes;
     for (let i = 0; i < this.growing.count; ++i) {
@@ -87,7 +87,7 @@ export class PointCloud {
   }
 }
 
-// Straight lines between keyframes, each a rectangle rotated to the eye.
+// Straight lines between keyframes; each is a rectangle that faces the camera.
 export class Lines {
   readonly object: Mesh<InstancedBufferGeometry, ShaderMaterial>;
   private readonly growing: Growing;

@@ -1,4 +1,4 @@
-// The WebSocket, opened again when it is lost.
+// The WebSocket to the server; it is opened again when it is lost.
 
 import { decode } from "./protocol";
 import type { Said, Update } from "./protocol";

@@ -37,7 +37,7 @@ function take(update: Update) {
   }
   if (update.view?.agent === watched) void drawView(update.view);
   for (const fusion of update.fusions) {
-    // Not what happened before the page was opened, or was jumped over.
+    // Fusions from before the page was opened, or that were jumped over, are not announced.
     if (!update.start && model.now_s - fusion.time_s < 3) announce(fusionText(fusion));
   }
   const { notice } = update;
@@ -71,7 +71,7 @@ function drawPanels() {
   drawLegend(stage.gridCell_m, stage.ellipseScale, model.leftOut);
 }
 
-// --- what people do
+// --- controls
 
 for (const what of ["points", "accepted", "refused", "anchors"] as const) {
   const box = byId<HTMLInputElement>(`show_${what}`);
@@ -164,13 +164,13 @@ function frame(now: number) {
 }
 requestAnimationFrame(frame);
 
-// For tests and the curious: what the page holds, and how fast it draws.
+// For tests and debugging: the page's data, and how fast it draws.
 Object.assign(window, {
   pangea: {
     model,
     stage,
     received: () => connection.bytes,
-    // Draws every frame for a while, also where nothing moves.
+    // Draws every frame for some seconds, even if nothing moves.
     async framesPerSecond(seconds: number): Promise<number> {
       measuring = true;
       const before = frames;

@@ -1,4 +1,4 @@
-// What the page knows of the scene, and where each keyframe is to be drawn.
+// The page's copy of the scene, and the pose at which each keyframe is drawn.
 
 import { Box3, Matrix4, Quaternion, Vector3 } from "three";
 import type {
@@ -41,32 +41,32 @@ export interface Keyframe {
   arrived: boolean; // a solved pose may come first
   T_odom_body: Pose;
   solved?: { group: number; T_map_body: Pose };
-  target: Pose; // where it belongs on the stage
-  shown: Pose; // where it is, on its way there
+  target: Pose; // the pose on the stage
+  shown: Pose; // the drawn pose, which moves to `target`
 }
 
 interface Anchor {
   said: AnchorSaid;
-  // The keyframe that carries it on the stage, so that it goes where that goes; -1: none yet.
+  // The keyframe to which the anchor is attached on the stage, so that it moves with it; -1: none yet.
   holder: number;
   T_holder_anchor: Pose;
-  // Where somebody at this page has put it, until the server says more than this revision.
+  // Where somebody on this page has put it, until the server has a revision after this one.
   moved?: { revision: number; T_holder_anchor: Pose };
 }
 
 interface Map_ {
   said: MapSaid;
   T_map_odom: Pose;
-  seqs: Map<number, number>; // keyframe by seq
-  newest: number; // keyframe with the highest seq; -1: none
+  seqs: Map<number, number>; // seq -> index of the keyframe
+  newest: number; // index of the keyframe with the highest seq; -1: none
   newestSeq: number;
 }
 
-// Metres. A cell of the layout grows in such steps, so that a growing map does not push the others
-// about all the time.
+// Metres. A cell of the layout grows in steps of kCellStep, so that a growing map does not move the other maps
+// all the time.
 const kCellStep = 5;
 const kMargin = 3;
-const kMaxHolders = 2000; // keyframes among which the one that carries an anchor is looked for
+const kMaxHolders = 2000; // number of keyframes that are searched for the one nearest to an anchor
 
 export class Model {
   start?: Update["start"];
@@ -74,7 +74,7 @@ export class Model {
   playing = true;
   speed = 1;
   leftOut = 0;
-  before = false; // every map by its own odometry
+  before = false; // show every map by its own odometry, as before the fusion
   maps: Map_[] = [];
   agents = new Map<number, AgentSaid>();
   keyframes: Keyframe[] = [];
@@ -84,10 +84,10 @@ export class Model {
   processes = new Map<string, ProcessSaid>();
   fusions: FusionSaid[] = [];
   anchors = new Map<number, Anchor>();
-  anchorsVersion = 0; // another number: another list
-  private unheld = new Set<number>(); // anchors whose place among the keyframes is to be found
-  readonly box = new Box3(); // of where all keyframes belong
-  private readonly unsettled = new Set<number>(); // keyframes that are new, or not where they belong
+  anchorsVersion = 0; // changes when the list of anchors changes
+  private unheld = new Set<number>(); // anchors that must be attached to a keyframe
+  readonly box = new Box3(); // bounds of the target positions of all keyframes
+  private readonly unsettled = new Set<number>(); // keyframes that are new, or not at their target yet
 
   apply(update: Update) {
     if (update.start) {
@@ -163,7 +163,7 @@ export class Model {
     return this.maps[keyframe.map]?.said.agent ?? 0;
   }
 
-  // The maps that are one group with the agent's, as agents.
+  // The agents whose maps are in one group with the agent's map.
   fusedWith(agent: AgentSaid): number[] {
     if (agent.map < 0 || !this.maps[agent.map]) return [];
     const group = this.maps[agent.map].said.group;
@@ -171,14 +171,14 @@ export class Model {
     return [...new Set(others)].filter((id) => id !== agent.id).sort((a, b) => a - b);
   }
 
-  // Keyframes at both ends of a constraint, where they have arrived.
+  // The keyframes at both ends of a constraint; undefined if one has not arrived.
   ends(constraint: ConstraintSaid): [number, number] | undefined {
     const a = this.maps[constraint.from[0]]?.seqs.get(constraint.from[1]);
     const b = this.maps[constraint.to[0]]?.seqs.get(constraint.to[1]);
     return a === undefined || b === undefined ? undefined : [a, b];
   }
 
-  // The agent's pose among the keyframes as they are shown: from the newest of its map, by odometry.
+  // The agent's pose relative to the drawn keyframes: from the newest one of its map, by odometry.
   shownPose(agent: AgentSaid): Pose | undefined {
     const map = agent.map < 0 ? undefined : this.maps[agent.map];
     if (!map || map.newest < 0) return undefined;
@@ -188,7 +188,7 @@ export class Model {
       .times(Pose.of(agent.T_odom_body));
   }
 
-  // Where every keyframe belongs: in its group's frame, the groups side by side.
+  // Sets the target of every keyframe: its pose in its group's frame, with the groups side by side.
   place() {
     const boxes: Boxes = new Map();
     for (const keyframe of this.keyframes) {
@@ -238,7 +238,7 @@ export class Model {
       this.unheld.delete(said.index);
       return;
     }
-    // One that somebody moved is near other keyframes now.
+    // A moved anchor is near other keyframes now.
     const same = known && known.said.revision === said.revision;
     const moved = known?.moved && said.revision <= known.moved.revision ? known.moved : undefined;
     this.anchors.set(said.index, {
@@ -250,8 +250,8 @@ export class Model {
     this.unheld.add(said.index);
   }
 
-  // An anchor is where the server has it in its group's frame. While the keyframe that carries it is in another
-  // group (a fusion, of which the anchor is not told yet), it stays with that.
+  // Attaches the anchors to keyframes. An anchor is at the server's pose in its group's frame. While its keyframe is
+  // in another group (after a fusion, before the anchor's new pose has come), it stays attached to that keyframe.
   private holdAnchors() {
     for (const [index, anchor] of this.anchors) {
       const T_map_anchor = Pose.of(anchor.said.T_map_anchor);
@@ -274,7 +274,7 @@ export class Model {
     return keyframe?.arrived && this.maps[keyframe.map].said.group === group;
   }
 
-  // Of many keyframes not every one is looked at.
+  // If there are many keyframes, only every n-th is searched.
   private nearestKeyframe(p_map: Vector3, group: number): number {
     const step = Math.ceil(this.keyframes.length / kMaxHolders);
     const pose = new Pose();
@@ -288,7 +288,7 @@ export class Model {
     return nearest;
   }
 
-  // On the stage; nothing while its group has no keyframe there.
+  // The anchor's pose on the stage; undefined while it is not attached to a keyframe.
   anchorPose(index: number): Pose | undefined {
     const anchor = this.anchors.get(index);
     const keyframe = anchor && this.keyframes[anchor.holder];
@@ -311,7 +311,7 @@ export class Model {
     return this.unsettled.size > 0;
   }
 
-  // Moves what is shown towards where it belongs; which keyframes it moved, or shows for the first time.
+  // Moves the drawn poses towards their targets. Returns the keyframes that moved or are drawn for the first time.
   settle(share: number): number[] {
     const moved = [...this.unsettled];
     for (const k of moved) {
@@ -329,7 +329,7 @@ export class Model {
   }
 }
 
-// In its group's frame: as solved, or by its map's odometry. Returns `into`.
+// The keyframe's pose in its group's frame: optimised, or by its map's odometry. Returns `into`.
 function fusedPose({ T_odom_body, solved }: Keyframe, map: Map_, into: Pose): Pose {
   return solved && solved.group === map.said.group
     ? into.copy(solved.T_map_body)
@@ -338,7 +338,8 @@ function fusedPose({ T_odom_body, solved }: Keyframe, map: Map_, into: Pose): Po
 
 type Boxes = Map<number, { min: Vector3; max: Vector3; agent: number }>;
 
-// Shifts that put the boxes into the cells of a square, by their lowest agent; one alone stays where it is.
+// The shifts that put the groups' boxes into the cells of a square grid, ordered by their lowest agent. A single
+// group is not shifted.
 function layOut(boxes: Boxes): Map<number, Vector3> {
   const cells = [...boxes.entries()].sort(([i, a], [j, b]) => a.agent - b.agent || i - j);
   if (cells.length === 1) return new Map([[cells[0][0], new Vector3()]]);

@@ -1,20 +1,19 @@
-// Everything around the drawing: agents, health, legend, player, tips.
+// The panels around the drawing: agents, state of processes, legend, player, tips.
 
 import type { Model } from "./model";
 import type { ConstraintSaid, ProcessSaid } from "./protocol";
 import { agentColour, colours } from "../../../web/page/palette";
 
-// A process that was not heard for this long, or an agent, is marked. Processes speak once a
-// second.
+// A process or an agent that was silent for this time is marked. Processes publish their status once per second.
 const kSilent_s = 3.5;
-const kNamed = 5; // of an agent's company; more are counted
-const kFullCards = 6; // of more agents a card says less, so that twelve have room
+const kNamed = 5; // fused agents that are named on a card; more are only counted
+const kFullCards = 6; // with more agents, cards are shorter, so that twelve have room
 
 export function byId<T extends HTMLElement = HTMLElement>(id: string): T {
   return document.getElementById(id) as T;
 }
 
-// A new element; text never becomes markup.
+// Makes an element; the text is never parsed as markup.
 export function element(tag: string, className: string, text = ""): HTMLElement {
   const made = document.createElement(tag);
   made.className = className;
@@ -22,8 +21,8 @@ export function element(tag: string, className: string, text = ""): HTMLElement 
   return made;
 }
 
-// The children of `parent`, one a key and in their order. Those that are there stay, so that what
-// people point at, press or read is not taken from under them ten times a second.
+// Gives `parent` one child for each key, in this order. Existing children stay, so that an element which people
+// press or read is not replaced ten times per second.
 export function keyed(parent: HTMLElement, keys: string[], make: (key: string) => HTMLElement): HTMLElement[] {
   const known = new Map([...parent.children].map((child) => [(child as HTMLElement).dataset.key, child]));
   const children = keys.map((key) => {
@@ -54,7 +53,7 @@ export function clock(seconds: number): string {
 
 const milliseconds = (value: number) => (value < 10 ? value.toFixed(1) : value.toFixed(0));
 
-// Half the length of the 95 % ellipse's longer axis.
+// Half the length of the longer axis of the 95 % ellipse.
 function radius95(covariance: [number, number, number, number]): number {
   const [xx, xy, yy] = covariance;
   const largest = (xx + yy) / 2 + Math.hypot((xx - yy) / 2, xy);
@@ -111,7 +110,7 @@ function healthOf(process: ProcessSaid, now_s: number): { mark: string; state: s
   return process.pending > 0 ? { mark: "◐", state: "busy" } : { mark: "●", state: "idle" };
 }
 
-// Messages that made no sense, and verification results against a candidate.
+// Number of messages and candidates that the process has refused.
 const refusalsOf = (process: ProcessSaid) =>
   process.refused.reduce((sum, [, count]) => sum + count, 0);
 

@@ -1,15 +1,15 @@
-// Where phones join this server: the gateway's address as a QR code, and its certificate's fingerprint to compare.
+// Shows where phones can join this server: the gateway's address as a QR code, and its certificate's fingerprint.
 
 import { encode } from "uqr";
 import type { Model } from "./model";
 import { byId } from "./panels";
 
-// The begin of STATUS_gateway's summary (modules/gateway/gateway_process.cc).
+// The beginning of STATUS_gateway's summary (modules/gateway/gateway_process.cc).
 const kAddress = /^(https:\S+\/) \(certificate's SHA-256 ([0-9A-F:]+)\)/;
 const kQuiet = 4; // modules around the code
 const kModule_px = 6;
 
-let shown = ""; // the address
+let shown = ""; // the address in the QR code
 
 function drawCode(text: string) {
   const { size, data } = encode(text, { border: kQuiet });
@@ -24,7 +24,7 @@ function drawCode(text: string) {
   }));
 }
 
-// A gateway that runs has a button.
+// Shows the button while a gateway runs.
 export function drawPhones(model: Model) {
   const [, url, fingerprint] = kAddress.exec(model.processes.get("gateway")?.summary ?? "") ?? [];
   byId("phones").hidden = url === undefined;

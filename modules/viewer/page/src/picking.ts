@@ -1,4 +1,4 @@
-// What is under the pointer, and where things are on the screen: in pixels of the canvas.
+// Finds what is under the pointer, and where things are on the screen, in pixels of the canvas.
 
 import { PerspectiveCamera, Plane, Raycaster, Vector2, Vector3 } from "three";
 import type { PointCloud } from "./buffers";
@@ -6,7 +6,7 @@ import { Model } from "./model";
 import type { ConstraintSaid } from "./protocol";
 
 const kHoverPixels = 8;
-const kPickPixels = 12; // from a map point
+const kPickPixels = 12; // largest distance to a map point
 
 export type Drawn = "points" | "accepted" | "refused" | "anchors";
 
@@ -19,7 +19,7 @@ export class Picking {
     private readonly shows: (what: Drawn) => boolean,
   ) {}
 
-  // Nothing behind the camera.
+  // The pixel of a point; undefined behind the camera.
   pixelOf(p: Vector3): Vector2 | undefined {
     const { clientWidth, clientHeight } = this.canvas;
     const at = p.clone().project(this.camera);
@@ -27,13 +27,13 @@ export class Picking {
     return new Vector2(((at.x + 1) / 2) * clientWidth, ((1 - at.y) / 2) * clientHeight);
   }
 
-  // Both ends; nothing behind the camera.
+  // The pixels of both ends of a constraint; undefined if one is behind the camera.
   onScreen(constraint: ConstraintSaid): [Vector2, Vector2] | undefined {
     const [a, b] = (this.model.ends(constraint) ?? []).map((k) => this.pixelOf(this.model.keyframes[k].shown.t));
     return a && b && [a, b];
   }
 
-  // The constraint under the pointer, among those shown.
+  // The drawn constraint under the pointer.
   constraintAt(x: number, y: number): ConstraintSaid | undefined {
     let best: ConstraintSaid | undefined;
     let least = kHoverPixels;
@@ -76,7 +76,7 @@ export class Picking {
     return best;
   }
 
-  // Where the pointer's ray meets a plane.
+  // The point where the pointer's ray meets a plane.
   onPlane(x: number, y: number, point: Vector3, normal: Vector3): Vector3 | undefined {
     const { clientWidth, clientHeight } = this.canvas;
     const caster = new Raycaster();

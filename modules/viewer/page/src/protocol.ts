@@ -1,4 +1,4 @@
-// What crosses the WebSocket. The server's side, with the layout of the bytes: modules/viewer/scene/update.h.
+// The messages of the WebSocket. The server's side, with the layout of the bytes, is modules/viewer/scene/update.h.
 
 // x y z, qw qx qy qz.
 export type PoseNumbers = ArrayLike<number>;
@@ -82,10 +82,10 @@ export interface ViewSaid {
   image: Uint8Array;
 }
 
-// In its group's frame, z up. Of one that is gone index, id and gone alone are told.
+// An anchor in its group's frame, z up. A gone anchor has only index, id and gone.
 export interface AnchorSaid {
   index: number;
-  id: [number, number]; // who made it (0: a tool on the server), when
+  id: [number, number]; // agent that made it (0: a tool on the server), and created_utime
   gone: boolean;
   name: string;
   revision: number;
@@ -93,7 +93,7 @@ export interface AnchorSaid {
   payload_bytes: number;
   group: number; // a map's index
   T_map_anchor: PoseNumbers;
-  sigma_m: number; // of the position, root mean square over its axes
+  sigma_m: number; // standard deviation of the position, root mean square over its axes
 }
 
 export interface Update {
@@ -103,7 +103,7 @@ export interface Update {
   playing: boolean;
   speed: number;
   left_out: number;
-  // In the first update of an epoch: forget all before.
+  // Set in the first update of an epoch: everything received before must be dropped.
   start?: { live: boolean; editable: boolean; source: string; end_s: number; all_fusions: FusionSaid[] };
   maps: MapSaid[];
   agents: AgentSaid[];

@@ -1,13 +1,13 @@
-// Everything that hangs on keyframes is placed by the graphics card: the poses of all keyframes are one
-// texture, a vertex names its keyframe. So when a solve moves a map, three texels a keyframe change,
-// and neither points nor lines are touched.
+// The graphics card places everything that belongs to a keyframe. The poses of all keyframes are in one texture, and a
+// vertex has the index of its keyframe. So when an optimisation moves a map, only three texels per keyframe change, and
+// no points or lines.
 
 import { DataTexture, FloatType, NearestFilter, RGBAFormat, ShaderMaterial } from "three";
 import type { Color, Vector2 } from "three";
 import type { Pose } from "./model";
 
 const kPerRow = 256; // keyframes in a row of the texture
-const kNumbers = 12; // of a keyframe: three texels
+const kNumbers = 12; // per keyframe: three texels
 
 const lookUp = /* glsl */ `
   uniform highp sampler2D poses;
@@ -22,12 +22,12 @@ const lookUp = /* glsl */ `
   }
 `;
 
-// Texels of a keyframe: (t, there), q, (colour, 0).
+// The texels of a keyframe: (t, 1 if it is there), q, (colour, 0).
 export class PoseTexture {
   readonly uniform: { value: DataTexture };
   private data = new Float32Array(0);
-  private whole = true; // nothing of it is on the graphics card yet, or it is to be sent anew
-  private readonly changed = new Map<number, { start: number; count: number }>(); // what is to be sent, by row
+  private whole = true; // the whole texture must be sent to the graphics card
+  private readonly changed = new Map<number, { start: number; count: number }>(); // ranges to be sent, by row
 
   constructor() {
     this.uniform = { value: this.make(1) };
@@ -74,7 +74,7 @@ export class PoseTexture {
     this.uniform.value.needsUpdate = true;
   }
 
-  // Of each row, from the first that changed to the last.
+  // Marks a keyframe to be sent. Each row is sent from its first changed keyframe to its last one.
   private send(keyframe: number, row: number) {
     const start = kNumbers * keyframe;
     const range = this.changed.get(row);
@@ -117,8 +117,8 @@ export const pointMaterial = (poses: Poses, size: { value: number }) =>
       }`,
   });
 
-// Lines of a width in pixels between two keyframes; dashed where `dash` is not 0. A negative red takes the
-// first keyframe's colour. No point hides a line: in a cloud of 100 000 nothing would be left of it.
+// Lines between two keyframes with a width in pixels, dashed if `dash` is not 0. If red is negative, the line has the
+// first keyframe's colour. Points never hide lines: among 100 000 points nothing would be left of a line.
 export const lineMaterial = (
   poses: Poses, screen: { value: Vector2 }, width: number, opacity: number,
 ) =>

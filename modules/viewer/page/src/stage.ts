@@ -1,5 +1,5 @@
-// The drawing: points, trajectories, constraints, agents. A frame sends the graphics card what changed
-// since the last one and nothing else.
+// The drawing: points, trajectories, constraints, agents. For a frame, only data that changed since the last frame
+// are sent to the graphics card.
 
 import { Box3, Color, GridHelper, PerspectiveCamera, Scene, Vector2, Vector3, WebGLRenderer } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
@@ -12,8 +12,8 @@ import type { AgentSaid, ConstraintSaid, Update } from "./protocol";
 import { agentColour, colours } from "../../../web/page/palette";
 import { lineMaterial, pointMaterial, PoseTexture } from "./shaders";
 
-const kFlight_m = 3; // from an anchor that it flies to
-const kSettle_ms = 350; // of what is left to where things belong, all but 1/e is gone in such a time
+const kFlight_m = 3; // distance from an anchor at the end of a flight to it
+const kSettle_ms = 350; // time constant (1/e) with which things move to their target
 
 const wantsStill = matchMedia("(prefers-reduced-motion: reduce)");
 
@@ -34,10 +34,10 @@ export class Stage {
   private readonly anchors: AnchorDrawings;
   readonly picking: Picking;
   private flight?: { target: Vector3; position: Vector3 };
-  private readonly colourOf = new Map<number, Color>(); // of an agent
+  private readonly colourOf = new Map<number, Color>(); // by agent
   private grid?: GridHelper;
   private readonly drawnConstraints = new Set<number>();
-  private readonly waitingConstraints = new Set<number>(); // new, or an end has not come
+  private readonly waitingConstraints = new Set<number>(); // not drawn yet: new, or a keyframe is missing
   private userMoved = false;
   private fittedTo = new Box3();
   private dirty = true;
@@ -78,7 +78,7 @@ export class Stage {
     this.recolour();
   }
 
-  // Colours of the theme.
+  // Sets the colours of the current theme.
   recolour() {
     this.scene.background = new Color(colours().background);
     if (this.grid) this.scene.remove(this.grid);
@@ -121,12 +121,12 @@ export class Stage {
     this.redraw();
   }
 
-  // A line to the keyframes before and after it in its map, if they are there already.
+  // Draws lines to the keyframes before and after it in its map, if they are there.
   private connect(map: number, seq: number, index: number) {
     const { seqs } = this.model.maps[map];
     const before = seqs.get(seq - 1);
     const after = seqs.get(seq + 1);
-    // Of two neighbours in one update both ask: the later one draws.
+    // If both neighbours are new in one update, both come here; only the one with the higher index draws.
     if (before !== undefined) this.trajectories.add(before, index, [-1, 0, 0, 0]);
     if (after !== undefined && after < index) this.trajectories.add(index, after, [-1, 0, 0, 0]);
   }
@@ -211,12 +211,12 @@ export class Stage {
     return this.camera.getWorldDirection(new Vector3());
   }
 
-  // The pointer does something else than moving the camera.
+  // While held, the pointer does not move the camera.
   holdCamera(held: boolean) {
     this.controls.enabled = !held;
   }
 
-  // To the anchor, looking the way it looks now.
+  // Moves the camera to the anchor without changing its direction.
   flyTo(index: number) {
     const pose = this.model.anchorPose(index);
     this.choose(index);
@@ -295,7 +295,7 @@ export class Stage {
     this.redraw();
   }
 
-  // Draws if anything moved. Returns whether it did.
+  // Draws a frame if anything moved, and returns whether it did.
   frame(now_ms: number, always = false): boolean {
     const share = 1 - Math.exp(-(now_ms - this.last_ms) / kSettle_ms);
     this.last_ms = now_ms;

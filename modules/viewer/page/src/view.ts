@@ -1,4 +1,4 @@
-// What the chosen agent's camera saw at its newest keyframe: its tracks, on the image if there is one.
+// Shows the view of the chosen agent's camera at its newest keyframe: its tracks, on the image if there is one.
 
 import { agentColour } from "../../../web/page/palette";
 import { byId } from "./panels";
@@ -27,7 +27,7 @@ export async function drawView(view: ViewSaid) {
   context.fillStyle = "#20242b";
   context.fillRect(0, 0, canvas.width, canvas.height);
   if (image) context.drawImage(image, 0, 0, canvas.width, canvas.height);
-  // Drawn small: strokes are given in pixels of the panel.
+  // The panel is small, so the widths of strokes are in its pixels.
   const scale = canvas.width / canvas.clientWidth || 1;
   const colour = agentColour(view.agent);
   for (const [width, stroke] of [[2.5, "rgb(0 0 0 / 60%)"], [1.2, colour]] as const) {

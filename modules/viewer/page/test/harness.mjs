@@ -1,4 +1,4 @@
-// What tests of the page need: the viewer as a process, a browser, checks that say what they saw.
+// Helpers for tests of the page: the viewer as a process, a browser, and checks that print what they found.
 
 import { spawn } from "node:child_process";
 import { parseArgs } from "node:util";
@@ -41,13 +41,13 @@ export function startViewer(...args) {
 export const launch = (more = []) =>
   chromium.launch({
     executablePath: options.chromium,
-    // Software rendering: there is no graphics card where CI runs.
+    // Software rendering, because CI machines have no graphics card.
     args: ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", ...more],
   });
 
 const consoleErrors = [];
 
-// `prepare`: done with the page before it is loaded.
+// `prepare` is called with the page before it is loaded.
 export async function openPage(browser, url, context = {}, prepare = async () => {}) {
   const page = await (
     await browser.newContext({ viewport: { width: 1280, height: 800 }, ...context })
@@ -61,7 +61,7 @@ export async function openPage(browser, url, context = {}, prepare = async () =>
   return page;
 }
 
-// Chromium's own remarks on software rendering are not the page's.
+// The page's errors, without Chromium's own messages about software rendering.
 const ownErrors = () =>
   consoleErrors.filter((text) => !/GPU stall|software WebGL|swiftshader/i.test(text));
 
@@ -72,7 +72,7 @@ export function check(what, good, saw = "") {
   console.log(`${good ? "ok    " : "FAILED"} ${what}${saw === "" ? "" : `: ${saw}`}`);
 }
 
-// Waits until `condition` holds in the page; `what` it is about.
+// Waits until `condition` is true in the page; `what` describes it.
 export async function becomes(page, what, condition, argument, timeout = 60_000) {
   try {
     await page.waitForFunction(condition, argument, { timeout });
@@ -82,7 +82,7 @@ export async function becomes(page, what, condition, argument, timeout = 60_000)
   }
 }
 
-// `expected`: errors in the console that the test itself brings about.
+// `expected`: errors in the console that the test itself causes.
 export async function run(test, expected = /^$/) {
   try {
     await test();

@@ -1,9 +1,9 @@
-// How fast the page draws, what a frame costs it besides the drawing, and how much it is sent: on a synthetic log
-// (pangea-viewer-bench-log) given as --log. Prints lines of metrics; bench/README.md says what they are of.
+// Measures how fast the page draws, the cost of a frame without the drawing itself, and the amount of data, on a synthetic
+// log (pangea-viewer-bench-log) given as --log. Prints metrics, which bench/README.md explains.
 
 import { launch, openPage, options, run, startViewer } from "./harness.mjs";
 
-// Counts what is asked of the graphics card, and draws nothing: what is left is the page's own work.
+// Counts the calls to the graphics card without executing them, so that only the page's own work is measured.
 function withoutDrawing() {
   const counts = (window.counts = { draws: 0, uploads: 0, bytes: 0, frames_ms: [], updates_ms: [] });
   const timed = (times, call) => (argument) => {
@@ -58,8 +58,8 @@ async function drawn(page, seconds) {
   return `${after.agents} agents, ${after.keyframes} keyframes, ${after.points} points: ${fps.toFixed(1)} frames/s, ${kB_per_s.toFixed(1)} kB/s`;
 }
 
-// CPU time of the page's thread by the browser's own account (other work on the machine is not in it), uploads and
-// bytes allocated, all per frame; and times of frames and updates as they pass on this machine.
+// Per frame: CPU time of the page's thread as counted by the browser (without other work on the machine), uploads, and
+// bytes allocated. Also the durations of frames and updates on this machine.
 async function cost(page, seconds) {
   const session = await page.context().newCDPSession(page);
   await session.send("Performance.enable", { timeDomain: "threadTicks" });
@@ -92,7 +92,7 @@ async function cost(page, seconds) {
     `${frames} frames: ${quantiles(counts.frames_ms)}, of ${counts.updates_ms.length} updates: ${quantiles(counts.updates_ms)}`;
 }
 
-// The log played through: \`measure\` tells of its beginning, of all fused and solved twice a second, and of its end.
+// Plays the log through, and calls `measure` before the fusion, after it, and at the end.
 async function play(page, name, measure) {
   await page.waitForFunction(() => pangea.model.start !== undefined);
   const slider = page.locator("#slider");

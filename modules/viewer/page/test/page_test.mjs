@@ -1,5 +1,5 @@
-// The page in headless Chromium: on a captured log, and on a live bus into which the log is played.
-// Writes screenshots to --out; `scripts/viewer --screenshots` puts them into docs/.
+// Tests the page in headless Chromium, with a captured log, and with a live bus on which the log is played.
+// Writes screenshots to --out; `scripts/viewer --screenshots` copies them to docs/.
 
 import { execFileSync } from "node:child_process";
 import { readFileSync, rmSync } from "node:fs";
@@ -16,7 +16,7 @@ async function seek(page, share) {
   await page.mouse.click(box.x + 8 + share * (box.width - 16), box.y + box.height / 2);
 }
 
-// Once nothing moves any more.
+// Waits until nothing moves any more.
 const settled = (page) =>
   becomes(page, "the maps stop moving", () => pangea.model.keyframes.every(
     (k) => !k.arrived || k.shown.t.distanceTo(k.target.t) < 1e-2));
@@ -74,7 +74,7 @@ async function testLog(browser) {
   viewer.kill();
 }
 
-// A constraint's line tells its verification result. Not every line has a place of its own: any of them will do.
+// Hovering over a constraint's line must show its verification result. Lines may overlap, so any of them will do.
 async function testHover(page, accepted) {
   const spots = await page.evaluate((wanted) => {
     const { model, stage } = pangea;
@@ -96,7 +96,7 @@ async function testHover(page, accepted) {
   await page.mouse.move(5, 400);
 }
 
-// Through an agent's camera: its tracks (the log holds no images), in its colour.
+// The view of an agent's camera must show its tracks in its colour (the log has no images).
 async function testCamera(page) {
   await page.locator('.agent[data-key="2"]').click();
   await becomes(page, "a click on an agent shows its tracks", () =>
@@ -146,7 +146,7 @@ async function testLive(browser) {
   await becomes(page, "an empty bus says what it waits for", () =>
     document.getElementById("empty").textContent.startsWith("Waiting for agents on udpm:"));
   await screenshot(page, "empty");
-  // What is there for a moment only is noted as it comes: a busy machine draws, and asks, too late.
+  // Short-lived states are recorded in the page, because a busy machine would ask for them too late.
   await page.evaluate(() => {
     window.seen = { twoMaps: false, notices: [] };
     const { model } = pangea;
@@ -171,7 +171,7 @@ async function testLive(browser) {
   await testLiveAnchors(page);
 }
 
-// Of a gateway, where phones join; as a camera reads it.
+// With a gateway, the page must show where phones join, as a QR code that can be read.
 async function testPhones(page, bus) {
   check("phones: without a gateway there is nothing to join", await page.locator("#phones").isHidden());
   const site = `${options.out}/site_of_phones`;
@@ -191,7 +191,7 @@ async function testPhones(page, bus) {
   await page.keyboard.press("Escape");
 }
 
-// Pixels of map points that nothing lies over, far from each other.
+// Pixels of map points that are not covered and are far from each other.
 const pointsToClick = (count) => {
   const { model, stage } = pangea;
   const found = [];
@@ -211,7 +211,7 @@ async function placeAnchor(page, point, name) {
   await page.locator('#anchor_dialog button[value="place"]').click();
 }
 
-// Where the first anchor is, on the stage and on the screen.
+// The position of the first anchor on the stage and on the screen.
 const anchorNow = () => {
   const [index] = pangea.model.anchors.keys();
   const { t } = pangea.model.anchorPose(index);
@@ -228,7 +228,7 @@ async function testLiveAnchors(page) {
   await becomes(page, "anchors: one that is placed is listed by its name", () =>
     document.querySelector(".anchor .name")?.textContent === "kettle <b>");
   let anchor = await page.evaluate(anchorNow);
-  // The nearest point to the pointer may be a neighbour of the one that was meant.
+  // The point nearest to the pointer may be a neighbour of the intended one.
   const off_px = Math.hypot(anchor.x - point.x, anchor.y - point.y);
   check("anchors: it is where it was put", off_px < 13, `${off_px.toFixed(1)} px off`);
   await page.locator(".anchor .what").click();
@@ -268,7 +268,7 @@ async function testLiveAnchors(page) {
   await page.screenshot({ path: `${options.out}/viewer_anchors.png`, clip: { x: 0, y: 0, width: 1280, height: y } });
 }
 
-// Of a log anchors are shown and listed; nobody changes them.
+// The anchors of a log are shown and listed, but cannot be changed.
 async function testAnchorsOfLog(page) {
   await becomes(page, "anchors: the log's ten are listed", () => document.querySelectorAll(".anchor").length === 10);
   check("anchors: nobody changes a log's",
@@ -281,7 +281,7 @@ async function testAnchorsOfLog(page) {
     const { shown, solved } = model.keyframes[holder];
     const [x, y, z] = said.T_map_anchor;
     const at = model.anchorPose(0).t;
-    // One group alone stays where it is, so the stage's frame is the map's.
+    // A single group is not shifted, so the stage's frame is the map frame.
     return Math.hypot(at.x - x, at.y - y, at.z - z) + shown.t.distanceTo(solved.T_map_body.t);
   });
   check("anchors: they are where the log has them", off < 0.03, `${off} m off`);
@@ -304,7 +304,7 @@ async function testAnchorsOfLog(page) {
     pangea.model.anchors.size === 0 && document.getElementById("anchors").hidden);
 }
 
-// Nothing of a card is cut off, and none is to be scrolled to.
+// All cards are completely visible without scrolling.
 const allCardsInSight = () => {
   const list = document.getElementById("agents");
   return document.querySelectorAll(".agent").length === 12 &&
