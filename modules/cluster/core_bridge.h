@@ -46,7 +46,7 @@ class CoreBridge : public Process {
   // Messages handled at once, so that the bus does not wait for long. It is more than a piece of
   // the journal's file has.
   static constexpr int kPiece = 500;
-  // Interval at which agent_handler is told again what is replicated.
+  // Interval at which JOURNAL_REPLICATED is repeated for agent_handler.
   static constexpr int64_t kToldInterval_us = 250'000;
 
   void OnJournalFile(const JournalFile& file);

@@ -6,8 +6,8 @@ namespace pangea {
 namespace {
 
 constexpr int64_t kTickInterval_us = 100'000;
-// Messages of one bus are handled for at most this time, then it is the turn of the other bus and
-// of Poll. A flood of messages must not delay Poll, which sends at most one burst per call.
+// Messages of one bus are handled for at most this time, then those of the other bus, then Poll is
+// called. A flood of messages must not delay Poll, which sends at most one burst per call.
 constexpr int64_t kBatch_us = 2'000;
 
 void HandleWaiting(LcmBus& bus) {

@@ -5,7 +5,8 @@
 // messages each, so that nobody waits for long while others catch up with many maps.
 //
 // Bounded: kMaxRequests of each of kMaxRequesters wait. A request that a waiting one covers is
-// dropped, and so is one beyond the bound (a requester that still lacks messages asks again).
+// dropped, and so is one beyond the bound (a requester that still lacks messages repeats its
+// request).
 
 #include <cstdint>
 #include <deque>

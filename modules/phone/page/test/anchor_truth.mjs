@@ -1,4 +1,4 @@
-// Anchors that page 1 places on things of a rendered scene, and how far from them page 2 draws them.
+// Places anchors on page 1 at points of a rendered scene, and checks how far from these points page 2 draws them.
 
 import { check } from "../../../viewer/page/test/harness.mjs";
 
@@ -8,7 +8,8 @@ const kTargets = 5;
 const kApart_m = 1;
 const kMaxError_px = 10;
 
-// What page 1 will tap: points of the scene that recording 2 has longest in view afterwards, apart from one another.
+// Chooses the points that page 1 will tap: points of the scene that recording 2 later sees for the longest time, and that are not
+// near each other.
 export function chooseTargets(first, second) {
   const tracks = first.tracks();
   const observations = new Map();
@@ -40,7 +41,7 @@ export function chooseTargets(first, second) {
   return targets;
 }
 
-// Notes, of every image that page shows, where it has drawn anchors, and whether it is told of a group.
+// Records for every image that the page shows where it has drawn anchors, and whether it is in a group.
 export const noteDrawn = (page) => page.evaluate(() => {
   window.noted = [];
   const look = () => {
@@ -51,7 +52,7 @@ export const noteDrawn = (page) => page.evaluate(() => {
   look();
 });
 
-// Taps, so to say, on each target in the first image that is shown at its time or after it. `offset_us`: from the page's stamps to
+// Places an anchor on each target, in the first image that is shown at or after its time. `offset_us`: from the page's time stamps to
 // the recording's.
 export async function placeAll(page, truth, targets, offset_us = 0) {
   const placed = await Promise.all(targets.map((target) => placeAt(page, truth, target, offset_us)));
@@ -75,7 +76,7 @@ function placeAt(page, truth, { name, utime, p_world }, offset_us) {
 
 const median = (values) => [...values].sort((a, b) => a - b)[Math.floor(values.length / 2)];
 
-// The anchors in page 2's images against where the targets are in them.
+// Compares the anchors in page 2's images with the true pixels of the targets.
 export async function checkShown(page, truth, targets, offset_us = 0) {
   const noted = await page.evaluate(() => noted);
   const told = noted.findIndex(({ fused }) => fused);
@@ -94,14 +95,14 @@ export async function checkShown(page, truth, targets, offset_us = 0) {
     medians.length > targets.length / 2 && median(medians) <= kMaxError_px, `${median(medians)?.toFixed(1)} px`);
 }
 
-// In one group, as they are told. The one with the oldest map is told nothing unless it walks on.
+// Checks that the pages are in one group. The one with the oldest map learns it only while it walks on.
 export async function checkFused(pages) {
   const poses = await Promise.all(pages.map((page) => page.evaluate(() => pangea.walk.pose)));
   poses.forEach(({ state, map, group, fused }) => console.log(`       ${state}, map ${map}, group ${group}, fused ${fused}`));
   check("all are in one group", poses.every(({ map, group }) => (group ?? map) === (poses[0].group ?? poses[0].map)));
 }
 
-// Waits, not for ever, until the page has an anchor well in its image, and photographs it.
+// Waits with a time-out until the page has an anchor well inside its image, and takes a screenshot.
 export async function photograph(page, file) {
   const isSeen = () => pangea.stage.drawn?.anchors.some(({ name, pixel: [u, v] }) =>
     name.startsWith("bench") && u > 80 && u < 560 && v > 80 && v < 400);

@@ -1,5 +1,6 @@
-// A rendered recording as the sensors of an emulated phone: its images as the file of Chromium's fake camera, its motion as
-// DevTools' virtual sensors. Before it begins, images of one grey each count up to it: from any of them it is known when it begins.
+// Emulates a phone's sensors with a rendered recording: its images are the file of Chromium's fake camera, its motion is given to
+// DevTools' virtual sensors. Before the recording come uniform grey images, each with another grey; each of them tells when the
+// recording begins.
 
 import { closeSync, existsSync, openSync, readdirSync, readFileSync, renameSync, writeSync } from "node:fs";
 import { PNG } from "pngjs";
@@ -11,7 +12,7 @@ const kBrighter = 3;
 const kKnownAt = kLeadIn - kRate_hz; // when its begin is told
 const kFeed_ms = 8; // twice as often as browsers look
 
-// Every image of the recording as YUV 4:2:0 with all 256 grey levels, written once.
+// Writes all images of the recording as YUV 4:2:0 with all 256 grey levels, unless the file exists.
 export function cameraFile(recording) {
   const file = `${recording}/camera.y4m`;
   if (existsSync(file)) return file;
@@ -37,12 +38,12 @@ export function cameraFile(recording) {
 export class EmulatedPhone {
   begun = new Promise((done) => (this.onBegun = done)); // when offset_us is known
 
-  // From the page's stamps to the recording's.
+  // Offset from the page's time stamps to the recording's.
   get offset_us() {
     return this.firstImage - this.began_us;
   }
 
-  // `page` is not yet started: its camera begins when it is.
+  // `page` must not be started yet, because its camera begins when it is.
   static async on(page, recording) {
     const phone = new EmulatedPhone();
     phone.devtools = await page.context().newCDPSession(page);
@@ -59,7 +60,7 @@ export class EmulatedPhone {
       let begin_us = Infinity;
       stage.keep = (utime, picture) => {
         const i = ((pangea.walk?.brightness ?? 0) - darkest) / brighter;
-        // A stamp may be late, and is never early.
+        // A time stamp may be late, but is never early.
         if (Number.isInteger(i) && i > 0) begin_us = Math.min(begin_us, utime + (leadIn - i) * period_us);
         if (i > knownAt) window.begin_us ??= begin_us;
         keep.call(stage, utime, picture);
@@ -68,7 +69,7 @@ export class EmulatedPhone {
     return phone;
   }
 
-  // Waits for the begin, and feeds motion until the recording's end.
+  // Waits for the beginning, and feeds motion until the end of the recording.
   async play(page) {
     await page.waitForFunction(() => window.begin_us, undefined, { polling: 5, timeout: 120_000 });
     this.began_us = await page.evaluate(() => begin_us);

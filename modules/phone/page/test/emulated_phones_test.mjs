@@ -1,5 +1,5 @@
-// As two_phones_test.mjs, with the recordings as the camera and the motion of two emulated phones, one after the other: what a
-// phone does, but for the phone.
+// As two_phones_test.mjs, but the recordings are the camera and the motion of two emulated phones, one after the other. So everything
+// is tested except the phone itself.
 
 import { readFileSync } from "node:fs";
 import { check, openPage, options, run } from "../../../viewer/page/test/harness.mjs";
@@ -30,7 +30,7 @@ async function started(server, name, n) {
   return { browser, page, phone, playing };
 }
 
-// Images a second, as the agent had them.
+// Prints the images per second that the agent got.
 async function rates(page) {
   const noted = await page.evaluate(() => noted.map(({ utime }) => utime));
   console.log(`       ${((noted.length - 1) / ((noted.at(-1) - noted[0]) / 1e6)).toFixed(1)} images a second`);
@@ -46,7 +46,7 @@ await run(async () => {
   await placeAll(anna.page, first, targets, anna.phone.offset_us);
   await anna.playing;
   await rates(anna.page);
-  // Her camera would begin again from the start.
+  // Her camera would start again from the beginning.
   await anna.page.locator("#stop").click();
   const ben = await started(server, "Ben", 2);
   void photograph(ben.page, `${options.out}/phone_emulated_2.png`);

@@ -1,12 +1,12 @@
-// In place of pangea_agent.mjs, for the page's own test: an agent that walks along odom's x at the height of 1.5 m, a centimetre
-// an image, and is told of an anchor that somebody else has placed, and of where somebody else is. What it was given is in its status. And a calibration that is none.
+// Replaces pangea_agent.mjs in the page's own test: an agent that walks along odom's x at a height of 1.5 m, one centimetre per image,
+// and gets an anchor of another agent and that agent's pose. Its status tells which data it got. The calibration is a fake too.
 
 const kAnchor = [0, 3, 1.5]; // straight ahead at the start
 const kOther = [1, 4, 1.5]; // its camera looks along odom's -y
 const kMap = "1/1700000000000000";
 const half = Math.SQRT1_2;
 
-// A bug that the agent itself does not catch.
+// Simulates a bug that the agent itself does not catch.
 function breakIfTold(imuYaml) {
   if (/breaks/.test(imuYaml)) throw new Error("a bug");
 }
@@ -72,7 +72,8 @@ class FakeAgent {
 
 const rangeOf = (bytes) => bytes && [Math.min(...bytes.slice(0, 50_000)), Math.max(...bytes.slice(0, 50_000))];
 
-// Knows the camera after kEnough images, three seconds in which a test can look, or at a recording's end: its focal length is kFocal.
+// Knows the camera after kEnough images (three seconds, in which a test can check the page), or at a recording's end. Its focal length
+// is kFocal.
 const kEnough = 60;
 const kFocal = 567;
 

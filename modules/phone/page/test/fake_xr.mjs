@@ -1,6 +1,6 @@
-// WebXR for tests: a session of immersive-ar with camera-access and dom-overlay, as the specifications have it. What it sees is the
-// test's: window.xrSource(time_ms) gives {picture, width, height, projection, position, orientation}, all but `picture` of a device
-// that is lost being absent. It shows the picture behind the page, as a device does.
+// A fake of WebXR for tests: an immersive-ar session with camera-access and dom-overlay, as specified. The test provides what it sees:
+// window.xrSource(time_ms) gives {picture, width, height, projection, position, orientation}; while the device is lost, only
+// `picture`. It shows the picture behind the page, as a device does.
 
 export function installFakeXr({ refusedFeature, frame_ms }) {
   const refuse = (name, text) => Promise.reject(new DOMException(text, name));
@@ -83,7 +83,7 @@ export function installFakeXr({ refusedFeature, frame_ms }) {
     constructor(_session, gl) {
       [this.gl, this.texture] = [gl, gl.createTexture()];
     }
-    // The first row of the texture is the lowest of the image. Of a canvas: WebGL does not flip an ImageBitmap.
+    // The first row of the texture is the lowest one of the image. A canvas is used, because WebGL does not flip an ImageBitmap.
     getCameraImage({ frame }) {
       if (!frame.active) throw new DOMException("the frame is over", "InvalidStateError");
       const { gl } = this;
@@ -109,7 +109,7 @@ export function installFakeXr({ refusedFeature, frame_ms }) {
   Object.defineProperty(navigator, "xr", { value: xr });
 }
 
-// Of a pinhole camera whose principal point is the middle of the image: column-major, as OpenGL's.
+// The projection matrix of a pinhole camera whose principal point is the middle of the image; column-major, as in OpenGL.
 export function projectionOf({ width, height, focal }) {
   const [near, far] = [0.1, 1000];
   return [

@@ -1,5 +1,5 @@
-// What interrupts a phone, at a real server with its gateway: the network is gone for a minute while Anna walks, and Ben's tab is
-// killed while it is gone. No keyframe is lost; Ben's old map stays, and his new one fuses.
+// Interruptions of phones, with a real server and gateway: the network is gone for a minute while Anna walks, and meanwhile Ben's tab
+// is killed. No keyframe may be lost; Ben's old map must stay, and his new one must fuse.
 
 import { execFileSync } from "node:child_process";
 import { check, openPage, options, run } from "../../../viewer/page/test/harness.mjs";
@@ -31,8 +31,8 @@ const unsent = (page) => page.evaluate(() => pangea.walk.numUnsent);
 const allSent = (page) => page.waitForFunction(
   () => /100 %/.test(document.getElementById("numbers").textContent) && pangea.walk.numUnsent === 0, undefined, { timeout: kAllSent_ms });
 
-// The keyframes of a map that the server has in its journal, as ids of the page's storage; whether they are the map's first ones,
-// without gaps.
+// The keyframes of a map in the server's journal, as ids of the page's storage, and whether they are the first ones of the map without
+// gaps.
 function keyframesOf(server, map) {
   const [agent, opened_utime] = map.split("/").map(Number);
   const list = execFileSync(`${options.bin}/pangea-log`,
@@ -42,7 +42,7 @@ function keyframesOf(server, map) {
   return { ids: [...seqs].map((seq) => `${map}#${seq}`), isWhole: [...seqs].every((seq) => seq < seqs.size) };
 }
 
-// What a page has in its storage: keyframes that the server has not acknowledged.
+// The keyframes in a page's storage, which the server has not acknowledged.
 const spooled = (page, agent) => page.evaluate((name) => new Promise((done, failed) => {
   const open = indexedDB.open(name);
   open.onerror = () => failed(open.error);

@@ -1,5 +1,5 @@
-// Five minutes of walking, played at twice the speed by the agent in Node at a real server, over TLS: its heap stays small, and
-// the server has every keyframe.
+// Plays five minutes of walking at twice the speed, with the agent in Node and a real server, over TLS. The agent's heap must stay
+// small, and the server must get every keyframe.
 
 import { spawn } from "node:child_process";
 import { check, options, run } from "../../../viewer/page/test/harness.mjs";
@@ -8,7 +8,7 @@ import { Server } from "./server.mjs";
 
 const kMaxHeap_MB = 64;
 
-// What the agent says at its end.
+// Runs the agent and returns its output.
 function played(server, { agent, key }, folder) {
   const said = [`${options.wasm}/pangea-agent.mjs`, "--agent", agent, "--key", key, "--gateway", `wss://localhost:${server.port}`, "--recording", folder, "--rate", 2];
   const env = { ...process.env, NODE_EXTRA_CA_CERTS: `${server.site}/gateway/ca.pem` };

@@ -1,5 +1,5 @@
-// The network between pages and the gateway. While it is gone nothing passes, and nobody is told; afterwards what was sent goes on,
-// as TCP does.
+// A network between pages and the gateway that can be interrupted. Meanwhile nothing passes, and no connection is closed; afterwards
+// the bytes are delivered, as with TCP.
 
 import { connect, createServer } from "node:net";
 
@@ -12,7 +12,7 @@ export class Network {
     this.gatewayPort = gatewayPort;
   }
 
-  // With a port of its own, which pages use in place of the gateway's.
+  // Listens on its own port, which pages use instead of the gateway's.
   static async before(gatewayPort) {
     const network = new Network(gatewayPort);
     const server = createServer((near) => (network.isUp ? network.join(near) : network.waiting.push(near.pause())));

@@ -1,4 +1,4 @@
-// Where a page shows the other page's camera, against where that is in the hall both recordings were rendered in.
+// Compares where a page shows the other page's camera with the true pose in the rendered hall of both recordings.
 
 import { Matrix4, Quaternion, Vector3 } from "three";
 import { check } from "../../../viewer/page/test/harness.mjs";
@@ -7,7 +7,7 @@ const kMaxError_m = 0.5; // a walk of half a second
 
 const matrixOf = ([x, y, z, qx, qy, qz, qw]) => new Matrix4().compose(new Vector3(x, y, z), new Quaternion(qx, qy, qz, qw), new Vector3(1, 1, 1));
 
-// Notes, some times a second, where the page's own body is, and the others' cameras.
+// Records some times per second the pose of the page's own body and of the others' cameras.
 export const noteOthers = (page) => page.evaluate(() => {
   window.notedOthers = [];
   setInterval(() => {
@@ -18,7 +18,8 @@ export const noteOthers = (page) => page.evaluate(() => {
   }, 200);
 });
 
-// `a` and `b`: {page, truth, agent, camera, timeOf}; `timeOf` gives the truth's time of an image, without it the image's. Both at once: b as a shows it, where b's own image was at that time.
+// `a` and `b`: {page, truth, agent, camera, timeOf}. `timeOf` converts an image's time to the truth's; without it they are equal. Compares
+// b as a shows it with the true pose of b's own image at the same time.
 export async function checkOther(a, b) {
   const cameraAt = ({ truth, timeOf = (utime) => utime }, utime) => timeOf(utime) && truth.cameraAt(timeOf(utime));
   const [ofA, ofB] = await Promise.all([a, b].map(({ page }) => page.evaluate(() => notedOthers)));

@@ -1,5 +1,5 @@
-// The page in headless Chromium, with an agent that is none (fake_agent.mjs): camera and motion as the browser emulates them, what
-// is drawn where, tapping, recording, and playing what was recorded.
+// Tests the page in headless Chromium with a fake agent (fake_agent.mjs) and with camera and motion emulated by the browser: drawing,
+// tapping, recording, and playing the recording.
 
 import { createServer } from "node:http";
 import { readFile } from "node:fs/promises";
@@ -15,7 +15,7 @@ const kTypes = { ".html": "text/html", ".js": "text/javascript", ".mjs": "text/j
 const kFake = fileURLToPath(new URL("fake_agent.mjs", import.meta.url));
 const kAgents = { agents: [{ agent: 2, name: "Anna", connected: true }, { agent: 3, name: "Ben", connected: true }] };
 
-// Refuses the first upload, keeps the second.
+// Refuses the first upload and keeps the second one.
 const uploads = [];
 function takeUploads(socket) {
   const messages = [];
@@ -32,7 +32,7 @@ function takeUploads(socket) {
   });
 }
 
-// The page, and as much of the gateway as it asks.
+// Serves the page, and those parts of the gateway that it uses.
 async function serve() {
   const server = createServer(async ({ url }, answer) => {
     const path = new URL(url, "http://x").pathname;
@@ -56,7 +56,7 @@ async function serve() {
 const screenshot = (page, name) => page.screenshot({ path: `${options.out}/phone_${name}.png` });
 const told = (page) => page.evaluate(() => JSON.parse(pangea.walk.vio.text));
 
-// A phone that is held upright and rotates about its x.
+// The motion of a phone that is held upright and rotates about its x axis.
 async function senseMotion(page) {
   const devtools = await page.context().newCDPSession(page);
   const readings = [["accelerometer", 0, 9.8, 0.3], ["linear-acceleration", 0, 0, 0.3], ["gyroscope", 0.5, 0, -0.25]];
@@ -116,7 +116,7 @@ async function testKeptCalibration(page) {
   await page.locator("#stop").click();
 }
 
-// Plays the recording that was made, with its files changed.
+// Plays the recording that was made, after changing its files.
 async function playChanged(page, zip, change) {
   const files = unzipSync(new Uint8Array(await readFile(zip)));
   for (const name of Object.keys(files)) if (name.endsWith("sensor.yaml")) change(files, name);
@@ -124,7 +124,7 @@ async function playChanged(page, zip, change) {
   await page.locator("#zip").setInputFiles({ name: "a.zip", mimeType: "application/zip", buffer });
 }
 
-// Without its calibration.
+// A recording without its calibration is calibrated.
 async function testUncalibrated(browser, url, zip) {
   const page = await openPage(browser, `${url}#rate=max`);
   await playChanged(page, zip, (files, name) => delete files[name]);
@@ -135,7 +135,7 @@ async function testUncalibrated(browser, url, zip) {
   await page.close();
 }
 
-// An agent, or a calibration, that is broken.
+// The agent or the calibration fails with a bug.
 async function testBroken(browser, url, zip) {
   for (const what of ["agent", "calibration"]) {
     const page = await openPage(browser, `${url}#rate=max`);
@@ -173,7 +173,7 @@ async function testAnchor(page) {
   check("at the pixel that was tapped", edit.name === "tap" && Math.hypot(edit.pixel[0] - u, edit.pixel[1] - v) < 0.1, String(edit.pixel));
 }
 
-// Somebody else's camera: at (1, 4, 1.5) in odom, the agent walks along x.
+// The other agent's camera is at (1, 4, 1.5) in odom, and this agent walks along x.
 async function testOther(page) {
   await becomes(page, "somebody else is named", () =>
     /^Ben · \d\.\d m$/.test(document.querySelector("#labels .person")?.textContent));
@@ -204,7 +204,7 @@ async function testRecording(page) {
   return zip;
 }
 
-// Of a member, who may choose.
+// A member can choose to upload the recording.
 async function testUpload(browser, url) {
   const page = await openPage(browser, url, { viewport: { width: 360, height: 720 }, permissions: ["camera", "accelerometer", "gyroscope"] });
   await page.evaluate((key) => localStorage.setItem("pangea.membership", JSON.stringify({ agent: 2, key, site: "hall", name: "Anna" })), "ab".repeat(32));
@@ -240,7 +240,7 @@ async function testPlaying(browser, url, zip) {
   await page.close();
 }
 
-// A device with an odometry of its own looks along odom's y from 1.5 m, at an image that is dark below and darker on the right.
+// A device with its own odometry looks along odom's y from a height of 1.5 m; the lower and the right part of its image are darker.
 async function testXr(browser, url) {
   const page = await openPage(browser, url, { viewport: { width: 360, height: 480 }, permissions: ["camera", "accelerometer", "gyroscope"] }, (page) => page.addInitScript(installFakeXr, { frame_ms: 33 }));
   await page.evaluate((projection) => {

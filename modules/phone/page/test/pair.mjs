@@ -1,11 +1,11 @@
-// Two pages of one server, of which one at least plays a recording.
+// Helpers for two pages of one server, of which at least one plays a recording.
 
 import { realpathSync } from "node:fs";
 import { check, openPage, options } from "../../../viewer/page/test/harness.mjs";
 import { noteDrawn } from "./anchor_truth.mjs";
 import { checkOther, noteOthers } from "./others_truth.mjs";
 
-// Chromium opens no file whose path has "..".
+// The real path, because Chromium does not open files whose path has "..".
 export const recording = (n) => realpathSync(`${options.recordings}/phone_${n}`);
 
 export function openInvited(browser, server, name, prepare = undefined) {
@@ -26,7 +26,7 @@ export async function joined(browser, server, name, folder) {
 
 export const atEnd = (page) => page.waitForFunction(() => /100 %/.test(document.getElementById("numbers").textContent), undefined, { timeout: 600_000 });
 
-// Of two sides, each a page with its truth (others_truth.mjs): each page shows the other.
+// Checks that each of two pages shows the other. `sides`: two pages with their truth (others_truth.mjs).
 export async function checkEachOther(...sides) {
   for (const side of sides) side.agent = await side.page.evaluate(() => pangea.walk.membership.agent);
   await checkOther(sides[0], sides[1]);

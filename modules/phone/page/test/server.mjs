@@ -1,4 +1,4 @@
-// A server with its gateway on a site of its own, and a browser that trusts that gateway's certificate and no other.
+// A server with a gateway on its own site, and a browser that trusts only this gateway's certificate.
 
 import { execFileSync } from "node:child_process";
 import { createHash, X509Certificate } from "node:crypto";
@@ -38,7 +38,7 @@ export class Server {
     await until("the gateway", () => answers(this.port));
   }
 
-  // The address that an invited visitor opens.
+  // Makes an invite and returns the address that the visitor opens.
   invite(name) {
     const said = execFileSync(`${options.bin}/pangea-gateway`, ["invite", "--site", this.site, "--name", name], { encoding: "utf8" });
     return /https:\S+#join=\S+/.exec(said)[0];
@@ -50,21 +50,21 @@ export class Server {
     return key;
   }
 
-  // One without an invite, that the gateway knows.
+  // Makes an agent without an invite, and waits until the gateway knows its key.
   async makeAgent(agent) {
     const key = this.makeKey(agent);
     await pause(kNewKey_ms);
     return { agent, key };
   }
 
-  // An agent that is a program, playing a recording.
+  // Starts a native agent (pangea-uplink and pangea-vio) that plays a recording.
   startNative(agent, recording) {
     this.run("pangea-uplink", "--agent", String(agent), "--key", this.makeKey(agent), "--bus", this.agentBus, "--link", this.link);
     this.run("pangea-vio", "--agent", String(agent), "--recording", recording, "--bus", this.agentBus, "--rate", "1");
   }
 
-  // Chromium as it is, but for two things: the key of this gateway's certificate is known to it, and it emulates no GPU, which would
-  // take more of the processor than the odometry. The page draws in two dimensions.
+  // Chromium with two changes: it trusts the key of this gateway's certificate, and it emulates no GPU, which would take more CPU time
+  // than the odometry. The page draws in two dimensions.
   browser(more = []) {
     const { publicKey } = new X509Certificate(readFileSync(`${this.site}/gateway/server.pem`));
     const spki = createHash("sha256").update(publicKey.export({ type: "spki", format: "der" })).digest("base64");

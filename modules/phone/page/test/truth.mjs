@@ -1,4 +1,4 @@
-// Where a rendered recording's things really are: exact poses of the body, and exact tracks of the scene's points.
+// The ground truth of a rendered recording: exact poses of the body, and exact tracks of the scene's points.
 
 import { readdirSync, readFileSync } from "node:fs";
 import { Matrix3, Matrix4, Quaternion, Vector3 } from "three";
@@ -18,17 +18,17 @@ export class Truth {
     this.recording = recording;
   }
 
-  // The stamps of the images.
+  // The time stamps of the images.
   images() {
     return readdirSync(`${this.recording}/mav0/cam0/data`).filter((name) => name.endsWith(".png")).sort().map((name) => utimeOf(name.slice(0, -4)));
   }
 
-  // Where the lens has a point of the camera frame.
+  // The pixel of a point of the camera frame.
   project(p_cam) {
     return project(this.camera, p_cam);
   }
 
-  // T_world_cam at a time, between the two poses around it.
+  // T_world_cam at a time, interpolated between the two poses around it.
   cameraAt(utime) {
     const { poses } = this;
     let i = poses.findIndex((pose) => pose.utime > utime);
@@ -39,7 +39,7 @@ export class Truth {
     return new Matrix4().compose(p, a.q.clone().slerp(b.q, share), new Vector3(1, 1, 1)).multiply(this.camera.T_body_cam);
   }
 
-  // Where a rolling shutter sees a point of the world in the image stamped `utime`; nothing when it does not.
+  // The pixel of a point of the world in the rolling-shutter image stamped `utime`; undefined if it is not visible.
   pixelOf(p_world, utime) {
     let pixel;
     let row = this.camera.height / 2;
@@ -54,7 +54,7 @@ export class Truth {
     return u >= 0 && v >= 0 && u < this.camera.width && v < this.camera.height ? pixel : undefined;
   }
 
-  // The ray through a pixel of the image stamped `utime`, in the world.
+  // The ray in the world through a pixel of the image stamped `utime`.
   rayOf([u, v], utime) {
     const [fx, fy] = this.camera.intrinsics;
     const ray = new Vector3(0, 0, 1);
@@ -81,7 +81,7 @@ export class Truth {
     return right.applyMatrix3(sum.invert());
   }
 
-  // Exact tracks: id of a point of the scene, its pixel, by image.
+  // The exact tracks by image: ids of points of the scene, with their pixels.
   tracks() {
     const byImage = new Map();
     for (const [stamp, id, u, v] of rows(`${this.recording}/mav0/cam0/tracks.csv`)) {

@@ -1,6 +1,6 @@
-// Two pages that play rendered phones, by invite, over TLS, at a real server with its gateway, beside an agent that is a program:
-// they fuse; page 1 places anchors on things of the scene; page 2 shows them where those are in its own images, and each page shows
-// the other. Page 2 has to calibrate its camera first; page 1 walks until page 2 is done, so that it is told who joined its map.
+// Two pages play recordings of rendered phones, by invite, over TLS, with a real server and gateway, beside a native agent. They must
+// fuse. Page 1 places anchors on points of the scene; page 2 must show them at the right places in its own images, and each page must
+// show the other. Page 2 first has to calibrate its camera; page 1 walks until page 2 is done, so that it learns who joined its map.
 
 import { cpSync, mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
@@ -10,7 +10,7 @@ import { atEnd, checkEachOther, joined, recording } from "./pair.mjs";
 import { Server } from "./server.mjs";
 import { Truth } from "./truth.mjs";
 
-// The same without calibration of its camera.
+// A copy of the recording without its camera's calibration.
 function uncalibrated(folder) {
   const copy = `${mkdtempSync(`${tmpdir()}/pangea_uncalibrated_`)}/walk`;
   cpSync(folder, copy, { recursive: true });

@@ -1,5 +1,6 @@
-// A page whose device has an odometry of its own, by a fake of WebXR that plays a rendered recording's images with their exact poses;
-// beside it a page that plays another recording as always, at a real server: they fuse, the second shows the anchor of the first, and each shows the other.
+// A page whose device has its own odometry: a fake of WebXR plays a rendered recording's images with their exact poses. A second page
+// plays another recording as usual, with a real server. They must fuse, the second must show the anchor of the first, and each must
+// show the other.
 
 import { Matrix4, Quaternion, Vector3 } from "three";
 import { check, options, run } from "../../../viewer/page/test/harness.mjs";
@@ -13,7 +14,7 @@ import { Truth } from "./truth.mjs";
 const kFocal = 445; // of the device's pinhole camera
 const kFrame_ms = 100;
 
-// The pose of WebXR's view, y up, for a camera in the world, z up (the other way round than src/xr/frames.ts).
+// The pose of WebXR's view (y up) for a camera in the world (z up): the inverse of src/xr/frames.ts.
 function viewOf(T_world_cam) {
   const inXr = ({ x, y, z }) => new Vector3(-y, z, -x);
   const [right, down, forward] = [0, 1, 2].map((i) => inXr(new Vector3().setFromMatrixColumn(T_world_cam, i)));
@@ -22,7 +23,7 @@ function viewOf(T_world_cam) {
   return { position: { x: p.x, y: p.y, z: p.z }, orientation: { x, y, z, w } };
 }
 
-// Of each pixel of the pinhole image, the pixel of the recording's: its lens is that of a phone.
+// For each pixel of the pinhole image, the pixel of the recording's image, which has a phone's lens.
 function lensMap(truth) {
   const { width, height } = truth.camera;
   const map = [];
@@ -35,7 +36,7 @@ function lensMap(truth) {
   return map;
 }
 
-// Every second image; the poses are those of its middle row.
+// Plays every second image, with the pose of its middle row.
 async function playAsXr(page, folder, truth) {
   await page.evaluate(() => {
     const input = Object.assign(document.createElement("input"), { type: "file", id: "xr_files", webkitdirectory: true, hidden: true });
@@ -79,7 +80,7 @@ async function playAsXr(page, folder, truth) {
       }
       window.xrLoaded = true;
     })();
-    // True to time: what is late is left out; where none is ready, time stands still.
+    // In real time: late frames are left out; if no frame is ready, time stands still.
     let due_ms = Infinity;
     let shown;
     window.xrSource = (time) => {
@@ -95,7 +96,7 @@ async function playAsXr(page, folder, truth) {
   }, { views, map: lensMap(truth), width, height, projection: projectionOf({ width, height, focal: kFocal }), frame_ms: kFrame_ms });
 }
 
-// Places an anchor in the first image after its time in which the pinhole camera has it.
+// Places an anchor in the first image after `utime` in which the pinhole camera sees the point.
 function place(page, truth, { name, utime, p_world }) {
   const { width, height } = truth.camera;
   const pixels = truth.images().filter((_, i) => i % 2 === 0).map((time) => {

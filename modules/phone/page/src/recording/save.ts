@@ -6,7 +6,7 @@ import { uploadRecording } from "../link/upload";
 import type { Membership } from "../messages";
 import { download } from "./recorder";
 
-// Asks a member where to save it. If the server does not take it, it asks again, so the recording is not lost.
+// Asks a member where to save it. If the server does not take it, the dialog opens once more, so the recording is not lost.
 export async function saveRecording(zip: Blob, name: string, membership: Membership | undefined, notice: (text: string) => void) {
   byId("save_text").textContent = `A recording of ${(zip.size / 1e6).toFixed(1)} MB, with camera images.`;
   while (membership && (await askDialog("save_dialog")) === "server") {
