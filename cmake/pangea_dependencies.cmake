@@ -1,5 +1,5 @@
-# Every package that a module links; scripts/packages.txt lists the Debian names. Installed too: it
-# is how find_package(pangea) finds them again.
+# Finds every package that a module links; scripts/packages.txt lists the Debian names. This file is
+# installed too: find_package(pangea) includes it to find the same packages.
 find_package(Boost 1.74 REQUIRED)
 find_package(OpenSSL 3.0 REQUIRED)
 find_package(Eigen3 3.4 REQUIRED NO_MODULE)
@@ -21,7 +21,7 @@ add_library(lcm::lcm UNKNOWN IMPORTED)
 set_target_properties(lcm::lcm PROPERTIES IMPORTED_LOCATION ${LCM_LIBRARY}
   INTERFACE_INCLUDE_DIRECTORIES ${LCM_INCLUDE_DIR})
 
-# Neither have libqrencode, libsodium and zstd.
+# libqrencode, libsodium and zstd have no CMake packages either.
 foreach(package qrencode sodium zstd)
   find_path(${package}_INCLUDE_DIR ${package}.h REQUIRED)
   find_library(${package}_LIBRARY ${package} REQUIRED)
@@ -30,19 +30,20 @@ foreach(package qrencode sodium zstd)
     IMPORTED_LOCATION ${${package}_LIBRARY} INTERFACE_INCLUDE_DIRECTORIES ${${package}_INCLUDE_DIR})
 endforeach()
 
-# Of SuiteSparse only CHOLMOD.
+# CHOLMOD is the only part of SuiteSparse that the modules link directly.
 find_path(CHOLMOD_INCLUDE_DIR cholmod.h PATH_SUFFIXES suitesparse REQUIRED)
 find_library(CHOLMOD_LIBRARY cholmod REQUIRED)
 add_library(suitesparse::cholmod UNKNOWN IMPORTED)
 set_target_properties(suitesparse::cholmod PROPERTIES
   IMPORTED_LOCATION ${CHOLMOD_LIBRARY} INTERFACE_INCLUDE_DIRECTORIES ${CHOLMOD_INCLUDE_DIR})
 
-# OpenCV's config sets plain include directories; as a SYSTEM target its headers stay quiet.
+# OpenCV's package sets plain include directories. A SYSTEM target silences warnings in its headers.
 add_library(pangea_opencv INTERFACE IMPORTED)
 target_include_directories(pangea_opencv SYSTEM INTERFACE ${OpenCV_INCLUDE_DIRS})
 target_link_libraries(pangea_opencv INTERFACE
   opencv_core opencv_imgproc opencv_features2d opencv_video opencv_calib3d)
 
-# What writes images or reads them in any format: it loads GDAL and much else.
+# For libraries that write image files or read them in any format. A target of its own, because
+# imgcodecs loads GDAL and many other libraries.
 add_library(pangea_image_files INTERFACE IMPORTED)
 target_link_libraries(pangea_image_files INTERFACE pangea_opencv opencv_imgcodecs)

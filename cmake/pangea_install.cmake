@@ -1,9 +1,10 @@
-# `cmake --install`, beside what each target says of itself: headers, the CMake package, units, session files.
-#   --component runtime   programs, the viewer's page, the types' jar, the package of Python, units, session files
+# Rules of `cmake --install` for files that belong to no single target: headers, the CMake package,
+# systemd units, session files. Each target has its own rules where it is defined.
+#   --component runtime   programs, web pages, the types' jar, the Python package, units, session files
 #   --component dev       libraries, headers, lcmtypes, find_package(pangea)
 include(CMakePackageConfigHelpers)
 
-# A module's own tests and their worlds stay here.
+# Headers of tests and of their test worlds are not installed.
 install(DIRECTORY ${CMAKE_SOURCE_DIR}/modules/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/pangea
   COMPONENT dev FILES_MATCHING PATTERN "*.h"
   REGEX "/testing$|/page$|/mcap$|/test_[a-z_]*\\.h$|_test_world\\.h$" EXCLUDE)
@@ -18,7 +19,7 @@ install(FILES ${generated_config} ${generated_version} ${CMAKE_CURRENT_LIST_DIR}
   DESTINATION ${package_dir} COMPONENT dev)
 install(EXPORT pangea FILE pangeaTargets.cmake NAMESPACE pangea:: DESTINATION ${package_dir} COMPONENT dev)
 
-# systemd looks for these under /usr/lib and, the units, under /usr/local/lib.
+# systemd looks for all of these under /usr/lib, and for the units under /usr/local/lib as well.
 set(packaging ${CMAKE_SOURCE_DIR}/packaging)
 install(DIRECTORY ${packaging}/systemd/ DESTINATION lib/systemd/system COMPONENT runtime)
 foreach(kind sysctl sysusers tmpfiles)

@@ -1,4 +1,4 @@
-# Helpers that make every module look the same.
+# Compiler options, and the functions with which every module defines its libraries, programs and tests.
 
 find_program(CCACHE ccache)
 if(CCACHE)
@@ -6,38 +6,39 @@ if(CCACHE)
 endif()
 
 add_compile_options(-Wall -Wextra -Wpedantic -Werror)
-# popcnt for Hamming distances. Nothing newer: Debian's Ceres and Eigen types must agree on
-# alignment, and the same binary must give the same bytes on every machine; hot loops are compiled
-# for AVX2 besides (vio/vector_clones.h).
+# x86-64-v2 has popcnt, which Hamming distances need. A newer level would change the alignment of
+# Eigen types, which must agree with Debian's Ceres. -ffp-contract=off: one binary must give the same
+# bytes on every machine. Hot loops are compiled for AVX2 in addition (vio/vector_clones.h).
 if(CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
   add_compile_options(-march=x86-64-v2 -ffp-contract=off)
 endif()
 if(PANGEA_SANITIZE)
-  # Lines are enough to find a place (-g1), and twice as fast to build as all of -g.
-  # GCC 12 sees uninitialised values in instrumented std::function and std::regex that are none.
+  # -g1 gives the line numbers that a report needs, and builds twice as fast as -g.
+  # GCC 12 warns wrongly of uninitialised values in instrumented std::function and std::regex.
   add_compile_options(-fsanitize=${PANGEA_SANITIZE} -fno-omit-frame-pointer -O1 -g1
     $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
-  # Boost.Asio's fences, which the thread sanitizer does not see; it has locks beside them.
+  # The thread sanitizer does not support Boost.Asio's fences, and GCC warns of them. Asio holds locks
+  # besides, so that no race is reported wrongly.
   if(PANGEA_SANITIZE STREQUAL "thread")
     add_compile_options($<$<CXX_COMPILER_ID:GNU>:-Wno-tsan>)
   endif()
   add_link_options(-fsanitize=${PANGEA_SANITIZE})
-  if(PANGEA_SANITIZE MATCHES "fuzzer")  # a report must end the run, or nobody sees it
+  if(PANGEA_SANITIZE MATCHES "fuzzer")  # a report must end the run, or nobody notices it
     add_compile_options(-fno-sanitize-recover=all -D_GLIBCXX_ASSERTIONS
       -fsanitize-ignorelist=${CMAKE_SOURCE_DIR}/tests/fuzz/sanitizer_ignored.txt)
   endif()
 endif()
 
-# All that people run, and all that `cmake --install` installs; no tests, no viewer's page.
+# Builds everything that users run and that `cmake --install` installs, except tests and web pages.
 add_custom_target(programs)
 
-# The include path of one module alone: a folder in which only this module's is. So a library sees the
-# headers of the modules whose libraries it names, and of those that these name, and no others: an
-# include that goes round the layers does not compile.
+# Sets `out` to the include path of one module: a folder that contains a link to this module only. A
+# library therefore sees the headers of the modules that it depends on, directly or indirectly, and no
+# others: an include that violates the layers does not compile.
 function(pangea_include_root out)
   file(RELATIVE_PATH module ${CMAKE_SOURCE_DIR}/modules ${CMAKE_CURRENT_SOURCE_DIR})
   string(REGEX REPLACE "/.*" "" module ${module})
-  if(module STREQUAL "..")  # tests, benches and examples have no headers for others
+  if(module STREQUAL "..")  # tests, benches and examples offer no headers to others
     set(${out} "" PARENT_SCOPE)
     return()
   endif()
@@ -47,9 +48,9 @@ function(pangea_include_root out)
   set(${out} ${root} PARENT_SCOPE)
 endfunction()
 
-# pangea_library(name [INTERNAL] [SOURCES ...] DEPENDS ...): a static library, or one of headers alone,
-# included as "<module>/<header>.h"; installed as pangea::<name without pangea_>. INTERNAL: not
-# installed (of tests and benches).
+# pangea_library(name [INTERNAL] [SOURCES ...] DEPENDS ...) defines a static library, or without
+# SOURCES a header-only one. Its headers are included as "<module>/<header>.h". It is installed as
+# pangea::<name without pangea_>, unless it is INTERNAL (e.g. for tests and benches).
 function(pangea_library name)
   cmake_parse_arguments(ARG "INTERNAL" "" "SOURCES;DEPENDS" ${ARGN})
   if(ARG_SOURCES)
@@ -74,7 +75,7 @@ function(pangea_library name)
   endif()
 endfunction()
 
-# A program's manual page, where help2man is at hand.
+# Makes a program's manual page from its --help, if help2man is installed.
 find_program(HELP2MAN help2man)
 function(pangea_manual_page name)
   if(NOT HELP2MAN OR PANGEA_SANITIZE)
@@ -91,7 +92,8 @@ function(pangea_manual_page name)
   install(FILES ${page} DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT runtime)
 endfunction()
 
-# pangea_program(name [INTERNAL] SOURCES ... DEPENDS ...): a binary, and a test that its --help works.
+# pangea_program(name [INTERNAL] SOURCES ... DEPENDS ...) defines a program, and a test that its --help
+# works. An INTERNAL program is not installed.
 function(pangea_program name)
   if(EMSCRIPTEN)
     return()
@@ -101,13 +103,13 @@ function(pangea_program name)
   pangea_include_root(root)
   target_include_directories(${name} PRIVATE ${root})
   target_link_libraries(${name} PRIVATE ${ARG_DEPENDS} CLI11::CLI11)
-  # What takes time is in the libraries; CLI11 compiles a third faster so.
+  # The expensive computations are in the libraries; with -O1, CLI11 compiles a third faster.
   target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-O1>)
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
   add_dependencies(programs ${name})
   if(NOT ARG_INTERNAL)
     install(TARGETS ${name} RUNTIME COMPONENT runtime)
-    # Bash looks for a file of the program's name.
+    # Bash looks for a file that has the program's name.
     install(FILES ${CMAKE_SOURCE_DIR}/scripts/completion/pangea.bash RENAME ${name} COMPONENT runtime
       DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
     pangea_manual_page(${name})
@@ -116,12 +118,13 @@ function(pangea_program name)
   set_tests_properties(${name}.help PROPERTIES LABELS unit)
 endfunction()
 
-# Where tests leave what they write: of this build tree, so that those of two trees do not meet.
+# Tests write into a folder of this build tree, so that the tests of two trees do not disturb each other.
 set(test_files ${CMAKE_BINARY_DIR}/tmp)
 file(MAKE_DIRECTORY ${test_files})
 
-# pangea_test(name [SEPARATE] SOURCES ... DEPENDS ... [LABEL unit|system|slow] [TIMEOUT s]): one
-# GoogleTest binary. SEPARATE: its sources use the same names, so that each is compiled by itself.
+# pangea_test(name [SEPARATE] SOURCES ... DEPENDS ... [LABEL unit|system|slow] [TIMEOUT s]) defines one
+# GoogleTest binary. SEPARATE compiles each source by itself, because several define the same names.
+# The label is unit and the timeout 120 s if they are not given.
 function(pangea_test name)
   if(EMSCRIPTEN)
     return()
@@ -133,14 +136,14 @@ function(pangea_test name)
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 120)
   endif()
-  if(PANGEA_SANITIZE)  # up to ten times slower
+  if(PANGEA_SANITIZE)  # tests are up to ten times slower
     math(EXPR ARG_TIMEOUT "10 * ${ARG_TIMEOUT}")
   endif()
   add_executable(${name} ${ARG_SOURCES})
   if(ARG_SEPARATE)
     set_target_properties(${name} PROPERTIES UNITY_BUILD OFF)
   endif()
-  # A test spends its time in the libraries; its own code is compiled a third faster so.
+  # A test spends its time in the libraries; with -O1, its own code compiles a third faster.
   target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-O1>)
   pangea_include_root(root)
   target_include_directories(${name} PRIVATE ${root})

@@ -1,4 +1,5 @@
-# `cpack -G DEB` in the build folder: pangea (what people run) and libpangea-dev (what they link).
+# `cpack -G DEB` in the build folder makes two Debian packages: pangea has the programs, libpangea-dev
+# the libraries and headers.
 set(CPACK_PACKAGE_NAME pangea)
 set(CPACK_PACKAGE_VENDOR Pangea)
 set(CPACK_PACKAGE_CONTACT "Pangea maintainers <pangea@localhost>")
@@ -15,14 +16,14 @@ set(CPACK_COMPONENT_RUNTIME_DESCRIPTION
   "Several phones map a building together: odometry, the link to the server, the server's\n\
 processes, scripted sessions, replay, the viewer; on the LCM message bus.")
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_SHLIBDEPS ON)
-# Started by name: lcm-logger by every session, gnuplot by its report.
+# Programs that ours start by name: every session starts lcm-logger, and its report gnuplot.
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_DEPENDS "liblcm-bin, gnuplot-nox | gnuplot")
-set(CPACK_DEBIAN_RUNTIME_PACKAGE_RECOMMENDS "python3")  # for the package pangea of Python
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_RECOMMENDS "python3")  # for the Python package pangea
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_SUGGESTS "liblcm-java, openjdk-17-jre, libjchart2d-java, nats-server")
 set(scripts ${CMAKE_SOURCE_DIR}/packaging/debian)
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_CONTROL_EXTRA ${scripts}/postinst ${scripts}/prerm)
 
-# Static libraries need the development packages of what they are made of.
+# Whoever links our static libraries needs the development packages of the libraries that they use.
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME libpangea-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_COMPONENT_DEV_DESCRIPTION

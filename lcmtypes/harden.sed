@@ -1,5 +1,6 @@
-# What lcm-gen 1.3.1 forgets in its C++ decoders. A count is obeyed before it is compared with what is left of the payload:
-# a negative one throws, a huge one allocates gigabytes first. A string's length may be less than 1, and INT_MIN reads
-# two gigabytes beyond the end. Every element takes at least a byte.
+# Adds checks that lcm-gen 1.3.1 lacks in its C++ decoders. They resize an array before they compare its
+# count with the rest of the payload: a negative count throws, a huge one first allocates gigabytes. (Every
+# element takes at least one byte, so that the rest bounds the count.) They also accept a string length
+# below 1: with INT_MIN they read two gigabytes beyond the end.
 s/^( *)(this->\w+\.resize\((this->\w+)\);)$/\1if(\3 < 0 || \3 > maxlen - pos) return -1;\n\1\2/
 s/if\((__\w+) > maxlen - pos\) return -1;/if(\1 < 1 || \1 > maxlen - pos) return -1;/

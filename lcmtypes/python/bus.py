@@ -8,8 +8,8 @@
     while True:
         bus.handle(1.0)
 
-Channels, types and rates: docs/bus.md. Handlers are called by handle(), in its thread; a Bus is for one thread.
-Like the other programs, a bus with ttl=0 takes nothing from other hosts.
+docs/bus.md lists channels, types and rates. handle() calls the handlers, in its own thread; only one thread may
+use a Bus. As in the C++ programs, a bus with ttl=0 drops all messages from other hosts.
 """
 
 import collections
@@ -26,15 +26,15 @@ import urllib.parse
 
 from . import image_t
 
-_BUFFER_BYTES = 4 << 20  # where the URL says nothing: the kernel's 200 kB lose bursts
+_BUFFER_BYTES = 4 << 20  # if the URL gives no size; with the kernel's 200 kB bursts are lost
 DEFAULT_URL = f"udpm://239.255.76.67:7667?ttl=0&recv_buf_size={_BUFFER_BYTES}"
 
 _SHORT, _FRAGMENT = 0x4C433032, 0x4C433033  # "LC02", "LC03"
-_MAX_SHORT = 65499  # channel, 0, data: what LCM still sends as one datagram
+_MAX_SHORT = 65499  # channel, 0, data: LCM sends up to this many bytes as one datagram
 _MAX_FRAGMENT = 65487
 _MAX_CHANNEL = 63
 _MAX_MESSAGE = 16 << 20
-_MAX_PARTIALS = 100  # messages that lack fragments; of more the oldest goes
+_MAX_PARTIALS = 100  # messages that lack fragments; beyond that the oldest is dropped
 _MAX_IMAGE_CHUNK = 29000
 
 
@@ -46,7 +46,7 @@ class Bus:
         self._number = itertools.count()
         self._subscriptions = []
         self._partials = collections.OrderedDict()  # (sender, number): {fragment number: (offset, bytes)}
-        self.refused = collections.Counter()  # what was dropped, by reason
+        self.refused = collections.Counter()  # number of dropped datagrams and messages, by reason
         try:
             self._sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
             self._sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, ttl)
@@ -59,7 +59,7 @@ class Bus:
                                        "(ip route add 224.0.0.0/4 dev lo)") from error
 
     def publish(self, channel, message):
-        """A message of the package pangea, or the bytes of an encoded one."""
+        """Sends a message of the package pangea, or the bytes of an encoded one."""
         data = bytes(message) if isinstance(message, (bytes, bytearray, memoryview)) else message.encode()
         name = channel.encode()
         if not 0 < len(name) <= _MAX_CHANNEL:
@@ -76,14 +76,17 @@ class Bus:
             self._sender.send(struct.pack(">IIIIHH", _FRAGMENT, number, len(data), offset, i, count) + piece)
 
     def subscribe(self, channels, handler, message_type=None):
-        """handler(channel, message) for every channel that the regular expression matches as a whole.
+        """Calls handler(channel, message) for each message whose whole channel name matches the regular expression.
 
-        With a message_type the handler gets that type; what does not decode is counted in `refused`. Without: the bytes.
+        With a message_type the message is decoded; one that does not decode is counted in `refused`. Without: the bytes.
         """
         self._subscriptions.append((re.compile(channels), handler, message_type))
 
     def handle(self, timeout_s=None):
-        """Waits for one message that somebody subscribed to and calls the handlers; False when none came in time."""
+        """Waits for one message with a subscription and calls its handlers; False if none came within timeout_s.
+
+        None waits without limit.
+        """
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
         while True:
             left = None if deadline is None else max(0.0, deadline - time.monotonic())
@@ -95,7 +98,7 @@ class Bus:
                 return True
 
     def fileno(self):
-        """For select and the like."""
+        """The receiving socket's file descriptor, for select and similar functions."""
         return self._receiver.fileno()
 
     def close(self):
@@ -119,7 +122,7 @@ class Bus:
         return delivered
 
     def _assemble(self, datagram, sender):
-        """(channel, data) where the datagram is, or completes, a message."""
+        """(channel, data) if the datagram is a message or completes one, else None."""
         magic = int.from_bytes(datagram[:4], "big")
         if magic == _SHORT and len(datagram) > 8:
             return self._split(datagram[8:])
@@ -156,7 +159,7 @@ class Bus:
 
 
 def image_chunks(utime, png, width, height):
-    """The messages of one image for IMAGE_k; `png`: the bytes of a PNG file, `utime`: microseconds."""
+    """Yields the messages of one image for IMAGE_k; `png`: the bytes of a PNG file, `utime`: microseconds."""
     pieces = [png[i:i + _MAX_IMAGE_CHUNK] for i in range(0, len(png), _MAX_IMAGE_CHUNK)]
     for i, piece in enumerate(pieces):
         chunk = image_t()
@@ -167,7 +170,7 @@ def image_chunks(utime, png, width, height):
 
 
 def _parse(url):
-    """group, port, ttl, receive buffer"""
+    """(group, port, ttl, receive buffer in bytes)"""
     parts = urllib.parse.urlsplit(url)
     try:
         arguments = dict(urllib.parse.parse_qsl(parts.query, strict_parsing=bool(parts.query)))
@@ -197,7 +200,7 @@ def _receiving_socket(group, port, buffer_bytes, host_only):
 
 
 def _keep_to_this_host(receiver):
-    """A packet filter as in modules/bus/transport/udpm_socket.cc: what came over lo, or our own multicast looped back."""
+    """Sets the packet filter of modules/bus/transport/udpm_socket.cc: packets over lo, and our own looped back."""
     so_attach_filter, note, load, equal, give = 26, 0xFFFFF000, 0x20, 0x15, 0x06
     code = [(load, 0, 0, note + 8), (equal, 2, 0, socket.if_nametoindex("lo")),  # the interface
             (load, 0, 0, note + 4), (equal, 0, 1, 5),  # PACKET_LOOPBACK
