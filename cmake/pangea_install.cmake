@@ -1,6 +1,6 @@
 # Rules of `cmake --install` for files that belong to no single target: headers, the CMake package,
 # systemd units, session files. Each target has its own rules where it is defined.
-#   --component runtime   programs, web pages, the types' jar, the Python package, units, session files
+#   --component runtime   programs, web pages, the types' jar, Python package, units, session files
 #   --component dev       libraries, headers, lcmtypes, find_package(pangea)
 include(CMakePackageConfigHelpers)
 

@@ -1,4 +1,5 @@
-# Compiler options, and the functions with which every module defines its libraries, programs and tests.
+# Compiler options, and the functions with which every module defines its libraries, programs and
+# tests.
 
 find_program(CCACHE ccache)
 if(CCACHE)
@@ -7,8 +8,8 @@ endif()
 
 add_compile_options(-Wall -Wextra -Wpedantic -Werror)
 # x86-64-v2 has popcnt, which Hamming distances need. A newer level would change the alignment of
-# Eigen types, which must agree with Debian's Ceres. -ffp-contract=off: one binary must give the same
-# bytes on every machine. Hot loops are compiled for AVX2 in addition (vio/vector_clones.h).
+# Eigen types, which must agree with Debian's Ceres. -ffp-contract=off: one binary must give the
+# same bytes on every machine. Hot loops are compiled for AVX2 in addition (vio/vector_clones.h).
 if(CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
   add_compile_options(-march=x86-64-v2 -ffp-contract=off)
 endif()
@@ -17,8 +18,8 @@ if(PANGEA_SANITIZE)
   # GCC 12 warns wrongly of uninitialised values in instrumented std::function and std::regex.
   add_compile_options(-fsanitize=${PANGEA_SANITIZE} -fno-omit-frame-pointer -O1 -g1
     $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
-  # The thread sanitizer does not support Boost.Asio's fences, and GCC warns of them. Asio holds locks
-  # besides, so that no race is reported wrongly.
+  # The thread sanitizer does not support Boost.Asio's fences, and GCC warns of them. Asio holds
+  # locks besides, so that no race is reported wrongly.
   if(PANGEA_SANITIZE STREQUAL "thread")
     add_compile_options($<$<CXX_COMPILER_ID:GNU>:-Wno-tsan>)
   endif()
@@ -33,8 +34,8 @@ endif()
 add_custom_target(programs)
 
 # Sets `out` to the include path of one module: a folder that contains a link to this module only. A
-# library therefore sees the headers of the modules that it depends on, directly or indirectly, and no
-# others: an include that violates the layers does not compile.
+# library therefore sees the headers of the modules that it depends on, directly or indirectly, and
+# no others: an include that violates the layers does not compile.
 function(pangea_include_root out)
   file(RELATIVE_PATH module ${CMAKE_SOURCE_DIR}/modules ${CMAKE_CURRENT_SOURCE_DIR})
   string(REGEX REPLACE "/.*" "" module ${module})
@@ -92,8 +93,8 @@ function(pangea_manual_page name)
   install(FILES ${page} DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT runtime)
 endfunction()
 
-# pangea_program(name [INTERNAL] SOURCES ... DEPENDS ...) defines a program, and a test that its --help
-# works. An INTERNAL program is not installed.
+# pangea_program(name [INTERNAL] SOURCES ... DEPENDS ...) defines a program, and a test that its
+# --help works. An INTERNAL program is not installed.
 function(pangea_program name)
   if(EMSCRIPTEN)
     return()
@@ -118,13 +119,14 @@ function(pangea_program name)
   set_tests_properties(${name}.help PROPERTIES LABELS unit)
 endfunction()
 
-# Tests write into a folder of this build tree, so that the tests of two trees do not disturb each other.
+# Tests write into a folder of this build tree, so that the tests of two trees do not disturb each
+# other.
 set(test_files ${CMAKE_BINARY_DIR}/tmp)
 file(MAKE_DIRECTORY ${test_files})
 
-# pangea_test(name [SEPARATE] SOURCES ... DEPENDS ... [LABEL unit|system|slow] [TIMEOUT s]) defines one
-# GoogleTest binary. SEPARATE compiles each source by itself, because several define the same names.
-# The label is unit and the timeout 120 s if they are not given.
+# pangea_test(name [SEPARATE] SOURCES ... DEPENDS ... [LABEL unit|system|slow] [TIMEOUT s]) defines
+# one GoogleTest binary. SEPARATE compiles each source by itself, because several define the same
+# names. The label is unit and the timeout 120 s if they are not given.
 function(pangea_test name)
   if(EMSCRIPTEN)
     return()

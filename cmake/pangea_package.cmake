@@ -1,5 +1,5 @@
-# `cpack -G DEB` in the build folder makes two Debian packages: pangea has the programs, libpangea-dev
-# the libraries and headers.
+# `cpack -G DEB` in the build folder makes two Debian packages: pangea has the programs,
+# libpangea-dev the libraries and headers.
 set(CPACK_PACKAGE_NAME pangea)
 set(CPACK_PACKAGE_VENDOR Pangea)
 set(CPACK_PACKAGE_CONTACT "Pangea maintainers <pangea@localhost>")

@@ -1,9 +1,9 @@
 # Web pages in TypeScript, which Vite builds. They need npm.
 find_program(NPM npm)
 
-# pangea_page(name FOLDER page OUT dir [SHARED files]) defines the target `name`, which builds the page
-# in the folder into dir, with the packages of its package-lock.json. SHARED lists source files outside
-# of its folder. `programs` does not build pages: the script that shows a page builds it.
+# pangea_page(name FOLDER page OUT dir [SHARED files]) defines the target `name`, which builds the
+# page in the folder into dir, with the packages of its package-lock.json. SHARED lists source files
+# outside of its folder. `programs` does not build pages: the script that shows a page builds it.
 function(pangea_page name)
   cmake_parse_arguments(ARG "" "FOLDER;OUT" "SHARED" ${ARGN})
   set(page ${ARG_FOLDER})

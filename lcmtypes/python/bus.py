@@ -8,8 +8,9 @@
     while True:
         bus.handle(1.0)
 
-docs/bus.md lists channels, types and rates. handle() calls the handlers, in its own thread; only one thread may
-use a Bus. As in the C++ programs, a bus with ttl=0 drops all messages from other hosts.
+docs/bus.md lists channels, types and rates. handle() calls the handlers in the thread of its caller;
+only one thread may use a Bus. As in the C++ programs, a bus with ttl=0 drops all messages from other
+hosts.
 """
 
 import collections
@@ -76,16 +77,17 @@ class Bus:
             self._sender.send(struct.pack(">IIIIHH", _FRAGMENT, number, len(data), offset, i, count) + piece)
 
     def subscribe(self, channels, handler, message_type=None):
-        """Calls handler(channel, message) for each message whose whole channel name matches the regular expression.
+        """Calls handler(channel, message) for each message whose full channel matches `channels`.
 
-        With a message_type the message is decoded; one that does not decode is counted in `refused`. Without: the bytes.
+        `channels` is a regular expression. With a message_type the message is decoded, or counted in
+        `refused` if that fails; without one the handler gets the bytes.
         """
         self._subscriptions.append((re.compile(channels), handler, message_type))
 
     def handle(self, timeout_s=None):
-        """Waits for one message with a subscription and calls its handlers; False if none came within timeout_s.
+        """Waits for one message with a subscription and calls its handlers.
 
-        None waits without limit.
+        Returns False if none came within timeout_s; None waits without limit.
         """
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
         while True:
@@ -159,7 +161,7 @@ class Bus:
 
 
 def image_chunks(utime, png, width, height):
-    """Yields the messages of one image for IMAGE_k; `png`: the bytes of a PNG file, `utime`: microseconds."""
+    """Yields the messages of one image for IMAGE_k. `png`: a PNG file, `utime`: microseconds."""
     pieces = [png[i:i + _MAX_IMAGE_CHUNK] for i in range(0, len(png), _MAX_IMAGE_CHUNK)]
     for i, piece in enumerate(pieces):
         chunk = image_t()
@@ -200,7 +202,7 @@ def _receiving_socket(group, port, buffer_bytes, host_only):
 
 
 def _keep_to_this_host(receiver):
-    """Sets the packet filter of modules/bus/transport/udpm_socket.cc: packets over lo, and our own looped back."""
+    """Drops packets of other hosts, with the filter of modules/bus/transport/udpm_socket.cc."""
     so_attach_filter, note, load, equal, give = 26, 0xFFFFF000, 0x20, 0x15, 0x06
     code = [(load, 0, 0, note + 8), (equal, 2, 0, socket.if_nametoindex("lo")),  # the interface
             (load, 0, 0, note + 4), (equal, 0, 1, 5),  # PACKET_LOOPBACK

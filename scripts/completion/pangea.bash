@@ -1,9 +1,9 @@
-# Bash completion of Pangea's programs: sub-commands, options and their choices as each program's own --help has them, names of
-# sessions, files.
+# Bash completion of Pangea's programs: sub-commands, options and their choices (taken from each
+# program's --help), names of sessions, files.
 #   source scripts/completion/pangea.bash                  (zsh: autoload -U bashcompinit && bashcompinit, before it)
-# `cmake --install` and the packages put it where bash-completion finds it by itself.
+# `cmake --install` and the packages install this file where bash-completion finds it by itself.
 
-# The sub-commands of a program.
+# Prints the sub-commands of a program.
 _pangea_commands() {
   "$1" --help 2>/dev/null | sed -n '/^Subcommands:/,$ s/^  \([a-z][a-z0-9-]*\)\( .*\)\?$/\1/p'
 }
