@@ -6,7 +6,8 @@ if(NOT EXISTS ${PANGEA_WASM_LIBRARIES}/complete)
 endif()
 # -msse2: Eigen has no vector code for WebAssembly, but the compiler translates SSE2.
 # -fgnuc-version: Eigen contains x86 assembler, which does not compile here. Some of it is used if
-#   10 * major + minor of GCC's version is below 63, the rest if major is 6 or more. 5.13 avoids both.
+#   10 * major + minor of GCC's version is below 63, the rest if major is 6 or more. 5.13 avoids
+#   both.
 # -mnontrapping-fptoint, -msign-ext: one instruction in place of several. Every browser that has
 #   vector instructions has these too.
 # -enable-interleaved-mem-accesses: without it the compiler reads and writes pairs lane by lane.

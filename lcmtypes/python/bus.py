@@ -8,9 +8,9 @@
     while True:
         bus.handle(1.0)
 
-docs/bus.md lists channels, types and rates. handle() calls the handlers in the thread of its caller;
-only one thread may use a Bus. As in the C++ programs, a bus with ttl=0 drops all messages from other
-hosts.
+docs/bus.md lists channels, types and rates. handle() calls the handlers in the thread of its
+caller; only one thread may use a Bus. As in the C++ programs, a bus with ttl=0 drops all messages
+from other hosts.
 """
 
 import collections
@@ -79,8 +79,8 @@ class Bus:
     def subscribe(self, channels, handler, message_type=None):
         """Calls handler(channel, message) for each message whose full channel matches `channels`.
 
-        `channels` is a regular expression. With a message_type the message is decoded, or counted in
-        `refused` if that fails; without one the handler gets the bytes.
+        `channels` is a regular expression. With a message_type the message is decoded, or counted
+        in `refused` if that fails; without one the handler gets the bytes.
         """
         self._subscriptions.append((re.compile(channels), handler, message_type))
 
