@@ -49,7 +49,7 @@ TEST_F(LinkWorld, HandlerKilledAndRestartedGoesOnFromItsJournal) {
     journalled.emplace_back(data.begin(), data.end());
     return true;
   });
-  // What was journalled but not yet published at the end is announced and served, not published.
+  // Keyframes journalled but not published at the end are announced, and sent on request only.
   EXPECT_GE(delivered.size(), 60u);
   delivered = journalled;
   ExpectDelivered(70);

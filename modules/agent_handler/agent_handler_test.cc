@@ -90,7 +90,7 @@ TEST_F(AgentHandlerTest, AcknowledgesHellosAndPieces) {
   EXPECT_EQ(handler.TakeAck(3 * kSecond).value().highest_number, 4);
 }
 
-// What only the journal knows is told in answer to a hello, not each time.
+// Acknowledgements of maps that only the journal contains answer a hello, and are not repeated.
 TEST_F(AgentHandlerTest, OldMapsAreSentInAnswerToAHello) {
   const MapId old{1, 500};
   handler.Resume(old, 9);
@@ -262,7 +262,7 @@ TEST(ResendQueue, AnswersInOrderAndDropsWhatIsCovered) {
                                    testing::Pair("fusion", 4), testing::Pair("fusion", 5)));
 }
 
-// Of the verification results that are asked for by name those that are there, and nothing else.
+// A request for named verification results is answered with those that exist, and nothing else.
 TEST(ResendQueue, AnswersForTheResultsThatAreThere) {
   JournalIndex index;
   index.AddKeyframe({kMap, 0}, {});

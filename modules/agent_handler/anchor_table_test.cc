@@ -18,7 +18,7 @@ std::vector<uint8_t> Message(const AnchorId& id, int64_t revision, bool gone = f
 
 class AnchorTableTest : public testing::Test {
  protected:
-  // What goes out now.
+  // The anchors that the table sends now.
   std::vector<LinkAnchor> Sent() {
     std::vector<LinkAnchor> sent;
     while (const auto body = table.Next(now)) {

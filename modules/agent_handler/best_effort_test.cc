@@ -1,4 +1,5 @@
-// What goes down once and is not repeated: landmarks, where the others are.
+// Messages that are sent to an agent once and not repeated: landmarks, positions of the other
+// agents.
 
 #include <gtest/gtest.h>
 

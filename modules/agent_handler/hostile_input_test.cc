@@ -1,4 +1,4 @@
-// What strangers, broken agents and broken processes may send the agent_handler.
+// Tests the agent_handler with bad input from strangers, broken agents and broken processes.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -74,7 +74,7 @@ TEST_F(LinkWorld, RefusalsShowInTheStatus) {
   ExpectDelivered(2);
 }
 
-// What a map is made of is known of its journalled keyframes too.
+// After a restart the handler still checks a map's new keyframes against the journalled ones.
 TEST_F(LinkWorld, AMapGoesOnFromItsJournalledKeyframes) {
   PublishKeyframes(3);
   Run(3);

@@ -205,7 +205,7 @@ TEST(Receiver, WhatIsAcknowledgedStaysAcknowledged) {
   EXPECT_EQ(ack.journalled_seq.at(kMap), 10);
 }
 
-// What is handed over but not on disk yet is not given up, whatever a hello says.
+// Keyframes handed over but not on disk yet are not given up, even if a hello says so.
 TEST(Receiver, AHelloGivesUpNothingThatIsOnItsWayToTheDisk) {
   Receiver receiver({}, CheckContent);
   receiver.OnHello({"", {{kMap, 0, 0}}});

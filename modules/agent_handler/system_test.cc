@@ -125,7 +125,7 @@ class LinkedAgents {
     EXPECT_EQ(handler_->End(SIGTERM), 0);
   }
 
-  // Of the agent that has fewest.
+  // The number of acknowledged keyframes of the agent that has the fewest.
   int32_t Acknowledged() const {
     return 1 + std::min(agents_[0]->acknowledged, agents_[1]->acknowledged);
   }
@@ -182,7 +182,7 @@ class LinkedAgents {
   bool handler_killed_ = false, uplink_killed_ = false, relay_killed_ = false;
 };
 
-// How many events of each channel; keyframes must be in order.
+// The number of events on each channel. Expects that keyframes are in order.
 std::map<std::string, int32_t> CountInJournal(const std::string& path) {
   std::map<std::string, int32_t> next;
   const Journal read(path, [&](const std::string& channel, Bytes data, const JournalPlace&) {
@@ -213,7 +213,8 @@ TEST_P(LinkSystem, TwoAgentsDeliverThroughKilledProcesses) {
       {"KEYFRAME_2", kKeyframes},
       {"OPTIONS_agent_handler", 1}};  // both starts had the same
   EXPECT_EQ(in_journal, expected);
-  // What was journalled but not yet published when the handler was killed is served, not seen.
+  // Keyframes journalled but not yet published when the handler was killed are only sent on
+  // request.
   EXPECT_GE(system.num_seen(), 2u * kKeyframes - 32);
 }
 

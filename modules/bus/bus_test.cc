@@ -64,7 +64,7 @@ TEST(LocalBus, DoesAllWorkAtOnce) {
   EXPECT_EQ(left, 0);
 }
 
-// What a piece says is heard before the next piece.
+// The messages that one piece of work publishes are handled before the next piece.
 TEST(LcmBus, WorksWhileNoMessageWaits) {
   LcmBus bus("memq://");
   std::string done;

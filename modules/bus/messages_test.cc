@@ -104,7 +104,7 @@ TEST(Messages, AKeyframeSaysHowSureItsScaleAndExtrinsicsAre) {
   EXPECT_EQ(out.value->corners.size(), in.corners.size());
 }
 
-// What a keyframe costs on the wire with 600 corners, 120 tracked, 70 points.
+// A keyframe with 600 corners, of which 120 are tracked, and 70 points.
 TEST(Messages, KeyframeFitsItsBudget) {
   EXPECT_LE(ToMessage(RandomKeyframe(2)).getEncodedSize(), 28'000);
 }

@@ -1,5 +1,5 @@
-// What happens when somebody sets the clock of the machine: this program's own clock_gettime stands
-// before the C library's, for the standard library's clocks too.
+// Tests how programs behave when somebody sets the machine's clock. This test's clock_gettime
+// replaces that of the C library, for the standard library's clocks too.
 
 #include <gtest/gtest.h>
 #include <sys/syscall.h>

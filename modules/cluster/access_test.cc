@@ -1,4 +1,4 @@
-// What packaging/pangea-nats-config makes, with a real nats-server: TLS, users, and what each may.
+// Tests the files of packaging/pangea-nats-config with a real nats-server: TLS, users, permissions.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>

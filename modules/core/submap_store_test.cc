@@ -109,7 +109,7 @@ TEST(SubmapStore, GoesOnAfterWhatWasLost) {
   EXPECT_TRUE(store.WindowUpTo({kMap, 3}, 5).empty());
 }
 
-// What a store says of a map with gaps, whatever is asked first.
+// The answers of a store about a map with gaps. They must not depend on the order of the queries.
 std::vector<std::vector<uint8_t>> Answers(SubmapStore store) {
   for (int seq = 0; seq < 60; ++seq) {
     if (seq % 20 != 13) {

@@ -94,7 +94,7 @@ class GatewayProcessTest : public testing::Test {
     Skip(kSecond);
     return KeyOf(agent_id);
   }
-  // Of the newest status.
+  // The newest status's counter of refusals whose reason begins so.
   int64_t NumRefused(const std::string& reason) {
     Skip(kSecond);
     for (const counter_t& refused : status_.refused) {
@@ -244,7 +244,7 @@ class HostileTest : public GatewayProcessTest {
     EXPECT_THAT(anna_.Received(), ElementsAre("down"));
   }
 
-  // Of somebody who has not proven a key.
+  // Opens a WebSocket without proof of a key.
   std::unique_ptr<web::TlsClient> OpenSocket() {
     auto client = std::make_unique<web::TlsClient>(process_->port());
     client->Send(web::UpgradeRequest("/link?agent=5", ""));

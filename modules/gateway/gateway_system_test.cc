@@ -113,7 +113,7 @@ TEST_F(GatewayProgram, FiftyAgentsAtOnceInBoundedMemory) {
   EXPECT_LT(each_kb, 200);
 }
 
-// Whoever got a key and lost the gateway tries again: never are there two keys out for one code.
+// An agent that got a key and lost the gateway tries again. One code never yields two keys.
 TEST_F(GatewayProgram, AKillWhileAgentsJoinHandsNoCodeOutTwice) {
   for (int round = 0; round < 8; ++round) {
     Start();

@@ -144,7 +144,7 @@ TEST_F(LinkSessionTest, AHelloWithANumberThatNoUplinkReachesIsRefused) {
   }
 }
 
-// Whatever a stranger sends, it costs no more than a packet of ours.
+// A packet of a stranger never costs more to check than one of ours.
 TEST_F(LinkSessionTest, WhatIsLargerThanAnyPacketIsNotEvenOpened) {
   for (const LinkKind kind : {LinkKind::kHello, LinkKind::kPiece, LinkKind::kWelcome}) {
     std::vector<uint8_t> large(1 << 20);
@@ -176,7 +176,7 @@ TEST_F(LinkSessionTest, AnotherKeyOrAgentGetsNothing) {
   EXPECT_NE(other_agent.Open(Hello()).refused, "");
 }
 
-// What was recorded in one session opens in none after it, whichever side restarted.
+// Packets recorded in one session do not open in any later session, whichever side has restarted.
 TEST_F(LinkSessionTest, RecordingsAreWorthless) {
   std::vector<Packet> up, down;
   const auto record = [&] {
@@ -196,7 +196,7 @@ TEST_F(LinkSessionTest, RecordingsAreWorthless) {
     for (const Packet& packet : up) {
       const auto opened = handler->Open(packet);
       EXPECT_FALSE(opened.packet);
-      // Of a handler that has restarted an answer to the newest hello is true, whoever brought it.
+      // A restarted handler's answer to the newest hello is valid, even if the hello was replayed.
       welcomed += uplink->Open(opened.welcome).new_session ? 1 : 0;
     }
     for (const Packet& packet : down) {

@@ -33,7 +33,7 @@ class LogReaderTest : public testing::Test {
       Add("POSE_1", static_cast<uint8_t>(i));
     }
   }
-  // Of all events so far.
+  // Adds an event with the checksums of all events so far.
   void AddChecksums() {
     Checksums checksums;
     for (size_t i = 0; i < begins.size(); ++i) {
@@ -57,7 +57,7 @@ class LogReaderTest : public testing::Test {
     reading = readings.at(path);
     return bytes;
   }
-  // How much of the file was read when each event was handed on.
+  // For each event, the part of the file that was read when the event was returned.
   std::vector<double> Shares() const {
     Save();
     LogReader log(path);

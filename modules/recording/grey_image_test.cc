@@ -149,7 +149,7 @@ TEST(GreyImage, AJpegOfManyScansIsRefused) {
   EXPECT_EQ(Why(bytes), "corrupt image: the JPEG cannot be decoded");
 }
 
-// Whatever the decoder makes of half an image, it ends here.
+// No exception leaves DecodeGrey, even if the image is truncated or damaged.
 TEST(GreyImage, WhatIsCutOrFlippedIsNoException) {
   for (const char* extension : {".png", ".jpg"}) {
     const std::vector<uint8_t> whole = Encoded(extension);

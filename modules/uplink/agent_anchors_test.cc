@@ -57,7 +57,7 @@ TEST(AgentAnchors, IsBounded) {
   EXPECT_EQ(anchors.Take(Anchor(++number, another), 0), Taken::kFull);
   EXPECT_TRUE(anchors.TakeReceived().empty()) << "what is not kept is not confirmed";
   EXPECT_FALSE(anchors.MakeRoomFor({1, 3})) << "it has room";
-  // What is gone makes room first, then what another session spoke of.
+  // Deleted anchors make room first, then anchors that only an earlier session has sent.
   LinkAnchor gone = Anchor(++number, {1, 7}, 2);
   gone.state.gone = true;
   EXPECT_EQ(anchors.Take(gone, 0), Taken::kNew);

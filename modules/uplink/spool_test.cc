@@ -177,7 +177,7 @@ TEST_F(SpoolTest, ADamagedIdIsNoOtherAgents) {
   EXPECT_THAT(Spool(folder, 1, kLarge).Kept(), testing::ElementsAre(KeyframeId{kMap, 1}));
 }
 
-// Of bits and of blocks of 4 kB.
+// The damage is single bits and blocks of 4 kB.
 TEST_F(SpoolTest, RandomDamageLosesTheKeyframesItHitsAtMost) {
   constexpr int kKeyframes = 8;
   {

@@ -102,7 +102,7 @@ TEST_F(UplinkTest, ProbesForALostTail) {
   EXPECT_TRUE(uplink.Asks(3 * kSecond + 500'000).empty());
 }
 
-// What it may have missed of maps before the newest is asked for too, but not for ever.
+// Keyframes that it may have missed in earlier maps are requested too, but only a few times.
 TEST_F(UplinkTest, LooksAFewTimesWhatCameBeforeTheNewestMap) {
   Add(4);
   uplink.AddKeyframe({{1, 5000}, 0}, std::vector<uint8_t>(500), 0);

@@ -39,7 +39,7 @@ TEST(AnchorRequests, AreGivenUpAndNamedOnce) {
   EXPECT_THAT(requests.Due(100 * kSecond), IsEmpty());
 }
 
-// Whoever drags an anchor twice within a second means the second place.
+// If a user drags an anchor twice within a second, the second place counts.
 TEST(AnchorRequests, TheNextEditOfAnAnchorTakesThePlace) {
   AnchorRequests requests;
   requests.Add(EditWith(1, 4), 0);

@@ -100,7 +100,7 @@ TEST_F(LogShowTest, OfManySolvesTheLastAndTheFusionsAreKept) {
   }
 }
 
-// Of an agent's images in a log, those of keyframes; the others would fill the memory.
+// Only the images of keyframes are kept; all images of a log would fill the memory.
 TEST(LogShow, KeepsTheImagesOfKeyframes) {
   const std::string path = testing::TempDir() + "viewer_images.lcm";
   KeyframeMessage keyframe{};
@@ -229,7 +229,7 @@ TEST_F(ViewerProcessTest, AsksForWhatCameBefore) {
   EXPECT_THAT(process_.scene().keyframes(), SizeIs(1));
 }
 
-// What strangers say is counted, and nothing of it is shown.
+// Malformed messages are counted, and nothing of them is shown.
 TEST_F(ViewerProcessTest, RefusesNonsense) {
   const std::vector<uint8_t> noise(100, 0xff);
   for (const char* channel : {"KEYFRAME_1", "POSE_1", "CORRECTION_1", "CONSTRAINT", "MAP_STATE",

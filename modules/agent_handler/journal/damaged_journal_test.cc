@@ -28,7 +28,7 @@ class DamagedJournal : public LinkWorld {
     });
   }
   using Events = std::vector<std::vector<uint8_t>>;
-  // What the journal has on a channel, in its order.
+  // The journal's events on one channel, in the journal's order.
   Events Journalled(const std::string& of) const {
     Events events;
     const Journal journal(journal_path,

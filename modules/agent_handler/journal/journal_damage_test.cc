@@ -1,4 +1,4 @@
-// What random damage costs a journal: at most the events that were hit, and nothing for ever.
+// Random damage costs a journal at most the events that were hit. Later starts lose nothing more.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -87,7 +87,7 @@ class JournalDamage : public testing::Test {
     *mend = journal.mend();
     return read;
   }
-  // What an LCM tool reads of it.
+  // The number of bytes of the events that an LCM tool reads from the journal.
   int64_t BytesOfEvents() const {
     lcm::LogFile log(path(), "r");
     int64_t bytes = 0;

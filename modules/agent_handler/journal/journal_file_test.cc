@@ -19,7 +19,7 @@ using Which = JournalFollower::Which;
 constexpr int64_t kWall = 1'700'000'000'000'000;
 constexpr int64_t kStep_us = 20'000;
 
-// Of another host: the file's name says nothing to it.
+// A bus to another host, where the journal file's name is of no use.
 class FarBus : public Bus {
  public:
   explicit FarBus(Bus& bus) : bus_(bus) {}

@@ -40,7 +40,7 @@ class JournalTest : public testing::Test {
   void WriteContents(const Contents& contents) const {
     std::ofstream(path, std::ios::binary) << contents;
   }
-  // What is kept beside the journal, which is taken away.
+  // Removes the copies of damaged parts that are kept beside the journal, and returns their bytes.
   Contents Copies() const {
     Contents copies;
     for (const auto& entry : std::filesystem::directory_iterator(folder)) {

@@ -280,7 +280,8 @@ TEST(JournalReader, AFileThatIsNotTheJournalIsLeftAndTheBusAsked) {
   }
 }
 
-// What a follower takes of a journal that has a checkpoint of its own state, and writes it anew.
+// A follower that restores its state from a checkpoint takes the rest of the journal, and can write
+// a new checkpoint.
 class JournalCheckpoints : public testing::Test {
  protected:
   std::string Write() { return Taken(true); }

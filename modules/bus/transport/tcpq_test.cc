@@ -82,7 +82,8 @@ class TcpqTest : public testing::Test {
     }
     return passes;
   }
-  // How long so many messages of 30 kB take to publish, whoever takes them.
+  // The seconds that it takes to publish `count` messages of 30 kB, whether or not they are
+  // received.
   double PublishMany(int count) {
     const auto begin = Clock::now();
     for (int i = 0; i < count; ++i) {
@@ -162,7 +163,7 @@ TEST_F(TcpqTest, AStoppedClientBlocksNobodyElse) {
   EXPECT_TRUE(Passes());
 }
 
-// What is said on stderr while the bus is handled for so long.
+// The text that stderr receives while the bus is handled for this number of seconds.
 std::string SaidMeanwhile(LcmBus* bus, double seconds) {
   testing::internal::CaptureStderr();
   for (const auto begin = Clock::now(); SecondsSince(begin) < seconds;) {

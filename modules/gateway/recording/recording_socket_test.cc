@@ -47,7 +47,7 @@ class RecordingSocketTest : public testing::Test, public RecordingSocketOwner {
     return bytes;
   }
   static std::string Zip(size_t size) { return "PK\x03\x04" + std::string(size - 4, 'z'); }
-  // What the socket says has been taken; -1: nothing new.
+  // The number of bytes that the socket reports as stored; -1: no new report.
   int64_t Taken() {
     const auto message = socket_->Next();
     int64_t value = message ? 0 : -1;

@@ -34,7 +34,7 @@ TEST(Scene, AKeyframeComesOnce) {
   EXPECT_EQ(scene.maps()[0].num_keyframes, 1);
 }
 
-// Of the same landmark in another keyframe nothing is drawn; points that are none are kept, and
+// A landmark is drawn only in its first keyframe. Points that are no landmarks are all drawn, and
 // another map has landmarks of its own.
 TEST(Scene, ALandmarkIsDrawnOnce) {
   Scene scene;

@@ -79,7 +79,7 @@ TEST(PageLink, OneUpdateIsUnderWayAtATime) {
   EXPECT_FALSE(link.Next().has_value()) << "nothing is new";
 }
 
-// What changed a hundred times while a page was busy is told once.
+// A value that changed a hundred times while a page was busy is sent once.
 TEST(PageLink, ASlowPageIsToldTheNewestOnly) {
   TestShow show;
   PageLink link(show);
