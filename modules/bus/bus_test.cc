@@ -167,7 +167,7 @@ TEST(Node, TellsOfTheNewestThousandMessages) {
   EXPECT_LT(node.Status(0, 0, "").handling_p99_ms, 5.0F);
 }
 
-// Every truncation and every single corrupted byte must come back as an answer, not as a crash.
+// Every truncated message and every corrupted byte must give a result, not a crash.
 TEST(DecodeMessage, SurvivesDamage) {
   const have_t have = MakeHave(7);
   std::vector<uint8_t> bytes = EncodeMessage(have);
@@ -195,7 +195,7 @@ int64_t PeakMemory_kB() {
   return usage.ru_maxrss;
 }
 
-// lcm-gen's decoders obey a count before they look what is left of the payload
+// lcm-gen's decoders use a count before they compare it with the rest of the payload
 // (lcmtypes/harden.sed).
 TEST(DecodeMessage, HugeAndNegativeCountsNeitherAllocateNorReadBeyondTheEnd) {
   again_t again{};

@@ -83,7 +83,7 @@ TEST(Messages, KeyframeRoundTrip) {
   EXPECT_EQ(out.points[9].inverse_depth, in.points[9].inverse_depth);
 }
 
-// The shipped type where it is enough: what read it before still does.
+// The older type is sent if it suffices, so that older programs can still read it.
 TEST(Messages, AKeyframeSaysHowSureItsScaleAndExtrinsicsAre) {
   Keyframe in = RandomKeyframe(1);
   const size_t shipped = EncodeMessage(ToMessage(in)).size();

@@ -31,7 +31,7 @@ class CheckpointFile : public testing::Test {
     writer.Put(std::vector<int32_t>{first, 2, 3});
     writer.Commit();
   }
-  // Why it is not used; empty if it is.
+  // The reason why the checkpoint is not used; empty if it is used.
   std::string Refused(const CheckpointKey& key = kKey) const {
     try {
       CheckpointReader reader(file(), key);
@@ -162,7 +162,7 @@ TEST_F(CheckpointFile, KilledWhileWritingLeavesTheOneBefore) {
   EXPECT_EQ(NumFiles(), 1u);
 }
 
-// A file that may not grow is a full disk.
+// A limit on the file size simulates a full disk.
 TEST_F(CheckpointFile, FullDiskIsAnErrorAndLeavesTheOneBefore) {
   Write(1);
   const int status = InChild([this] {

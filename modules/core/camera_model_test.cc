@@ -70,7 +70,7 @@ TEST_P(CameraModelTest, NothingBehindTheCamera) {
 INSTANTIATE_TEST_SUITE_P(Models, CameraModelTest,
                          ::testing::Values(EurocTestCamera(), FisheyeCamera()));
 
-// Radtan's polynomial turns back far outside the image; such points must not appear inside it.
+// The radtan polynomial is not monotonic far outside the image; such points must not appear in it.
 TEST(CameraModel, FoldedDistortionIsRefused) {
   CameraModel camera = EurocTestCamera();
   camera.distortion << -0.3, 0, 0, 0;  // turns back at r = 1.05

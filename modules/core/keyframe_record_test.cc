@@ -123,7 +123,7 @@ TEST(KeyframeRecord, WhatIsNoneIsRefused) {
   EXPECT_FALSE(KeyframeFromRecord(longer));
 }
 
-// No count makes it take memory that the record does not fill, no index leads out of it.
+// A damaged count allocates no more memory than the record fills; no index points outside of it.
 TEST(KeyframeRecord, HostileSizes) {
   const std::vector<uint8_t> record = ToRecord(Full());
   const uint32_t huge = 0x7fffffff;

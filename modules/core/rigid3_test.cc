@@ -69,7 +69,7 @@ TEST_F(Rigid3Test, YawSurvivesItsOwnRotation) {
   }
 }
 
-// First-order propagation against the Jacobian taken numerically.
+// Compares the first-order propagation with a numerical Jacobian.
 TEST_F(Rigid3Test, CovarianceOfAProduct) {
   for (int i = 0; i < 20; ++i) {
     const Rigid3 A = RandomRigid3();

@@ -7,7 +7,7 @@
 namespace pangea {
 namespace {
 
-// 300 items, ten a second.
+// 300 items, ten per second.
 std::string Told(bool is_terminal) {
   std::ostringstream out;
   double now_s = 1000;

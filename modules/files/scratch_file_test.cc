@@ -54,7 +54,7 @@ TEST(ScratchFile, TakesNoMoreThanItMay) {
   EXPECT_EQ(ReadBack(file, *at, 4), (Bytes{1, 2, 3, 6}));
 }
 
-// As of a disk that is full for a while: what was there is there, what comes later finds room.
+// A disk that is full for a while: earlier records stay readable, and later ones can be written.
 TEST(ScratchFile, SaysWhyItCannotWriteAndTriesAgain) {
   std::signal(SIGXFSZ, SIG_IGN);
   ScratchFile file({.folder = testing::TempDir()});

@@ -1,4 +1,5 @@
-// Both ends' sessions against a network that may keep, change, repeat and turn back every packet.
+// Tests both ends' sessions over a network that may record, change, repeat and reflect every
+// packet.
 
 #include "link/link_session.h"
 
@@ -19,7 +20,7 @@ class LinkSessionTest : public testing::Test {
   Packet Hello() { return uplink->Seal({LinkKind::kHello, ++number, {1, 2}}); }
   Packet Piece(uint8_t content) { return uplink->Seal({LinkKind::kPiece, ++number, {content}}); }
 
-  // As the two do it: hello, welcome, a hello that names the handler's run.
+  // The normal handshake: hello, welcome, a hello that names the handler's run.
   void Connect() {
     const auto first = handler->Open(Hello());
     EXPECT_FALSE(first.packet);
@@ -53,7 +54,8 @@ TEST_F(LinkSessionTest, CarriesPacketsBothWays) {
   }
 }
 
-// Each takes the session from the other; one that was started again does not come back.
+// A restarted uplink takes over the session. If the earlier one takes it back, two uplinks are
+// reported.
 TEST_F(LinkSessionTest, TwoUplinksOfOneAgentAreTold) {
   UplinkSession other(kAgent, key);
   const auto connect = [&](UplinkSession& session) {
@@ -248,7 +250,6 @@ TEST_F(LinkSessionTest, ARestartedUplinkTakesTheSessionOver) {
   EXPECT_TRUE(handler->Open(Piece(1)).packet);
 }
 
-// On a long way many hellos go out before the first is answered: one session comes of it.
 // A run names one session: a recorded hello cannot end the one that came after it.
 TEST_F(LinkSessionTest, ARunIsOfferedUntilItIsUsedAndNeverAgain) {
   Connect();
@@ -262,6 +263,7 @@ TEST_F(LinkSessionTest, ARunIsOfferedUntilItIsUsedAndNeverAgain) {
   EXPECT_TRUE(handler->Open(Piece(1)).packet);
 }
 
+// With a long round trip many hellos are sent before the first answer: they make only one session.
 TEST_F(LinkSessionTest, ManyHellosUnderWayMakeOneSession) {
   std::vector<Packet> hellos;
   for (int i = 0; i < 16; ++i) {

@@ -37,7 +37,7 @@ TEST(MapContinuity, TimeGoesForwardWithSeq) {
   EXPECT_EQ(continuity.Check(other, 5), "") << "another map has its own time";
 }
 
-// An odometry that refines its calibration, and a lens that focuses.
+// The intrinsics may change when an odometry refines its calibration or the lens focuses.
 TEST(MapContinuity, AMapsCameraMayMoveALittle) {
   MapContinuity continuity;
   continuity.Check(At(0, 100), 5);

@@ -12,7 +12,7 @@ namespace {
 constexpr int kMessages = 60;
 constexpr std::chrono::milliseconds kTakes{3};
 
-// Each message takes its time; what is to be sent must not wait until all are handled.
+// Handling a message takes time; Poll must be called before all waiting messages are handled.
 class Slow : public PolledProcess {
  public:
   explicit Slow(LcmBus& bus) {

@@ -49,7 +49,7 @@ TEST(RepeatQueue, KeepsItsRate) {
   EXPECT_GE(bytes, 59 * 4000);
 }
 
-// All change and are confirmed more often than the rate carries: each has its turn.
+// All values change and are confirmed faster than the rate allows: each is sent in rotation.
 TEST(RepeatQueue, NoneWaitsForEver) {
   constexpr int kAnchors = 100;
   RepeatQueue queue(4000);

@@ -90,7 +90,7 @@ TEST(ReplayWindow, TheOldestItCanTellIsAWindowBack) {
   const int64_t highest = 9000;
   window.Take(highest);
   const int64_t oldest = highest - ReplayWindow::kSize + 1;
-  // Their places in the window are free: only their age tells.
+  // Their places in the window are free, so that only their age makes them invalid.
   for (int64_t number = oldest - ReplayWindow::kSize; number < oldest; ++number) {
     ASSERT_FALSE(window.IsFresh(number)) << number;
   }

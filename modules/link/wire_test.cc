@@ -182,8 +182,8 @@ TEST(Wire, AckRoundTripAndRefusal) {
   EXPECT_FALSE(ParseAckBody(2, Encode(ack)).value);
 }
 
-// Also of packets that are sealed as they should be, by an agent that has gone mad: nothing
-// crashes, and what is cut is refused.
+// A faulty agent can seal any bytes correctly. Such packets must not cause a crash, and truncated
+// ones are refused.
 TEST(Wire, DamagedBodiesAreRefusedOrBounded) {
   const std::vector<std::vector<uint8_t>> bodies = {Encode(SomeHello()), Encode(SomeAck()),
                                                     EncodePose(SomePose())};

@@ -47,7 +47,7 @@ class LogReaderTest : public testing::Test {
     std::ofstream(path, std::ios::binary)
         .write(reinterpret_cast<const char*>(file.data()), std::ssize(file));
   }
-  // The first byte of each event handed on.
+  // The first byte of each event that the reader returns.
   std::vector<int> Read() {
     Save();
     std::vector<int> bytes;

@@ -74,7 +74,7 @@ TEST_F(LogScanTest, ReadsWholeEvents) {
   EXPECT_THAT(Scan().events, testing::ElementsAre(0, 1, 2));
 }
 
-// Every bit of the first three events' headers: the one that is hit may be lost, no other.
+// Flips every bit of the first three events' headers: only the event that is hit may be lost.
 TEST_F(LogScanTest, AFlippedBitInAHeaderLosesItsEventAlone) {
   Fill(5);
   for (int event = 0; event < 5; ++event) {
@@ -117,7 +117,7 @@ TEST_F(LogScanTest, DamageOverSeveralEvents) {
   EXPECT_THAT(read.events, testing::IsSubsetOf({0, 1, 4, 5})) << "1 has its header";
 }
 
-// Cut at every byte of the last event.
+// Truncates the log at every byte of the last event.
 TEST_F(LogScanTest, ATornTailIsNoDamage) {
   Fill(3);
   const std::vector<uint8_t> whole = file;

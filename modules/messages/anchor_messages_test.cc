@@ -1,4 +1,4 @@
-// Anchors there and back, and what the border refuses.
+// Converts anchors to messages and back; bad messages are refused.
 
 #include "messages/anchor_messages.h"
 

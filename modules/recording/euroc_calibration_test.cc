@@ -45,7 +45,7 @@ TEST(EurocCalibration, KalibrsCamchainIsUnderstood) {
   EXPECT_EQ(camera.cx, 254.9);
   EXPECT_EQ(camera.distortion[2], -0.002);
   EXPECT_EQ(camera.time_offset_s, 0.002);
-  // T_cam_imu takes points of the body to the camera; ours is the other way round.
+  // T_cam_imu transforms points from the body to the camera; ours is the inverse.
   EXPECT_LT((camera.T_body_cam.t - Eigen::Vector3d(0.1, 0, 0)).norm(), 1e-12);
   EXPECT_LT((camera.T_body_cam.q * Eigen::Vector3d::UnitZ() - Eigen::Vector3d::UnitX()).norm(),
             1e-12);

@@ -22,8 +22,8 @@ using ::testing::IsEmpty;
 
 constexpr int64_t kStart = 1403636584763555584;
 
-// A recording of 10 images of 32x24 pixels at 20 Hz and 1 s of IMU at 200 Hz, which each test
-// breaks in its own way.
+// A recording of 10 images of 32x24 pixels at 20 Hz and 1 s of IMU at 200 Hz. Each test damages it
+// in a different way.
 class EurocTest : public ::testing::Test {
  protected:
   void SetUp() override {

@@ -28,7 +28,8 @@ std::vector<uint8_t> Encoded(const std::string& extension, cv::Size size = kSize
 
 std::vector<uint8_t> Bytes(std::string_view text) { return {text.begin(), text.end()}; }
 
-// A PNG whose header says so, with pixels or without: a decoder that believes it asks for 3.6 GB.
+// A PNG whose header states this size, with pixels or without. With a huge size a decoder that
+// trusts the header allocates 3.6 GB.
 std::vector<uint8_t> PngThatClaims(int width, int height) {
   std::vector<uint8_t> bytes = Encoded(".png");
   for (int i = 0; i < 4; ++i) {
@@ -53,7 +54,7 @@ TEST(GreyImage, DecodesPngAndJpeg) {
   }
 }
 
-// Colour, alpha and 16 bits become grey as cv::imread has it.
+// Colour, alpha and 16-bit images are converted to grey as by cv::imread.
 TEST(GreyImage, PixelsAreThoseOfOpenCv) {
   for (const int type : {CV_8UC1, CV_8UC3, CV_8UC4, CV_16UC1, CV_16UC3}) {
     for (const char* extension : {".png", ".jpg"}) {
@@ -133,7 +134,7 @@ TEST(GreyImage, TextsOfAPngAreNotUnpacked) {
   EXPECT_LT(peak_kB() - before_kB, 50'000);
 }
 
-// Each costs a pass over the whole image.
+// Each scan of a progressive JPEG costs a pass over the whole image.
 TEST(GreyImage, AJpegOfManyScansIsRefused) {
   std::vector<uint8_t> bytes;
   cv::imencode(".jpg", cv::Mat(kSize, CV_8UC1, cv::Scalar(77)), bytes,

@@ -59,7 +59,7 @@ TEST_F(TextFileTest, WhatIsNoFileIsNamedWithTheCause) {
   EXPECT_FALSE(Exists(Path("loop")));
 }
 
-// A reader that opened one by itself would hang here, or fill the memory.
+// A reader that opens such a file without a check would block here, or fill the memory.
 TEST_F(TextFileTest, EveryReaderLooksFirst) {
   ASSERT_EQ(mkfifo(Path("fifo").c_str(), 0600), 0);
   for (const std::string& path : {Path("fifo"), std::string("/dev/zero")}) {

@@ -20,7 +20,7 @@ using Which = JournalFollower::Which;
 constexpr int64_t kTick_us = 100'000;
 const MapId kMap{1, 1000};
 
-// A follower on a bus, what it hands on, and what it asks for ("KEYFRAME_1 3-5").
+// A follower on a bus, the messages that it delivers, and its requests ("KEYFRAME_1 3-5").
 struct Follower {
   explicit Follower(const JournalFollower::Follows& follows)
       : node(bus, "test"),

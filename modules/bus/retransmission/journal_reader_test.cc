@@ -1,4 +1,5 @@
-// The journal's file read by a follower. How it follows the bus: journal_follower_test.cc.
+// Tests how a follower reads the journal's file. journal_follower_test.cc tests how it follows the
+// bus.
 #include "bus/retransmission/journal_reader.h"
 
 #include <fcntl.h>
@@ -26,7 +27,7 @@ using Which = JournalFollower::Which;
 
 const MapId kMap{1, 1000};
 
-// A file of events in a folder of the test's own.
+// A journal file in a folder that only this test uses.
 class TestJournal {
  public:
   TestJournal() : folder_(testing::TempDir() + "/journal_reader_" + std::to_string(getpid())) {
@@ -67,7 +68,7 @@ class TestJournal {
     result.reason = "too few inliers";
     Add("CONSTRAINT", ToMessage(result));
   }
-  // Each with its match, and from the second on a result.
+  // Adds keyframes, each with its match, and from the second on with a verification result.
   void AddKeyframes(int32_t count) {
     for (int32_t seq = 0; seq < count; ++seq) {
       AddKeyframe(seq);
@@ -78,7 +79,7 @@ class TestJournal {
     }
   }
 
-  // Its file was emptied.
+  // Starts a new journal, as if the file had been emptied.
   void Restart() { state_ = {}; }
 
   std::string path() const { return folder_ + "/journal.lcm"; }
@@ -90,7 +91,7 @@ class TestJournal {
   JournalState state_;
 };
 
-// Work waits until the test does it.
+// A bus whose idle work waits until the test does it.
 class IdleBus : public LocalBus {
  public:
   void WorkWhenIdle(const std::function<bool()>& piece) override { work_ = piece; }
@@ -105,7 +106,7 @@ class IdleBus : public LocalBus {
   std::function<bool()> work_;
 };
 
-// A follower, what it hands on ("k0 m0 r0"), and what it asks for.
+// A follower, the messages that it delivers ("k0 m0 r0"), and its requests.
 struct Follower {
   explicit Follower(const JournalFollower::Follows& follows,
                     const JournalCheckpoint& checkpoint = {})

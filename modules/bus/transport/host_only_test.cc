@@ -1,4 +1,4 @@
-// A bus of this host takes nothing from other hosts (udpm_socket.h).
+// A bus with ttl=0 receives nothing from other hosts (udpm_socket.h).
 
 #include <arpa/inet.h>
 #include <fcntl.h>
@@ -66,7 +66,7 @@ std::vector<uint8_t> IpPacket(const std::string& to, const std::vector<uint8_t>&
 // A network namespace with loopback and one cable, whose other end the test holds.
 class Outside {
  public:
-  // False where that is not permitted.
+  // False if the machine does not permit that.
   bool Open() {
     if (unshare(CLONE_NEWNET) != 0) {
       return false;

@@ -1,4 +1,4 @@
-// Buses over LCM's own relay, which is killed, stopped and started again.
+// Tests buses over LCM's own relay while it is killed, stopped and restarted.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -23,7 +23,7 @@ double SecondsSince(Clock::time_point begin) {
   return std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
-// A port that nobody has just now.
+// A port that is free at the moment.
 uint16_t FreePort() {
   const int fd = socket(AF_INET, SOCK_STREAM, 0);
   sockaddr_in address{};
@@ -143,8 +143,8 @@ TEST_F(TcpqTest, AStoppedRelayBlocksNobody) {
   EXPECT_TRUE(Passes());
 }
 
-// The relay waits for a client that takes nothing, and everybody for the relay: messages are lost
-// then, but nobody blocks, and when the client goes on or away, all goes on.
+// The relay blocks on a client that reads nothing. Messages are lost then, but no other client
+// blocks, and when the client reads again or ends, messages flow again.
 TEST_F(TcpqTest, AStoppedClientBlocksNobodyElse) {
   StartRelay();
   ASSERT_TRUE(Passes());
@@ -193,7 +193,7 @@ TEST(TcpqUrl, AnAddressThatMakesNoSenseIsAnError) {
   EXPECT_THROW(LcmBus("tcpq://127.0.0.1:port"), std::runtime_error);
 }
 
-// Not every server is a relay.
+// The server at the address need not be a relay.
 TEST(TcpqUrl, WhatIsNoRelayIsLeft) {
   const int fd = socket(AF_INET, SOCK_STREAM, 0);
   sockaddr_in address{};

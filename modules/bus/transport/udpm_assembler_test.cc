@@ -32,7 +32,7 @@ std::optional<Taken> Take(UdpmAssembler& assembler, const Datagram& datagram, ui
              : std::nullopt;
 }
 
-// As LCM cuts a message.
+// Cuts a message into fragments as LCM does.
 std::vector<Datagram> Fragments(uint32_t message_number, const std::string& channel,
                                 const std::string& data, size_t bytes) {
   const std::string whole = channel + kEnd + data;
@@ -220,7 +220,7 @@ TEST(UdpmAssembler, MemoryIsBoundedAndTheOldestGoesFirst) {
   const auto first = Fragments(7, "KEPT", large + large, 65'000);
   ASSERT_EQ(first.size(), 2u);
   for (uint64_t sender = 0; sender < 2000; ++sender) {
-    // One whose fragments still come is not the oldest.
+    // A message whose fragments still arrive is not the oldest.
     EXPECT_FALSE(Take(assembler, first[0], 1'000'000));
     Take(assembler, FragmentDatagram({1, 16 << 20, 1, 1, 3}, large), sender);
     EXPECT_LE(assembler.partial_bytes(), UdpmAssembler::kMaxPartialBytes);

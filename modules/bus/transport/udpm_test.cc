@@ -1,4 +1,4 @@
-// Buses over multicast on this host, in one process, with strangers beside them.
+// Tests buses over multicast in one process on this host, while strangers send packets as well.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -168,7 +168,7 @@ TEST_F(UdpmTest, AHandlersExceptionComesOutAndItsSubscriptionCounts) {
   EXPECT_THAT(Heard(&bus), ElementsAre("LARGE 0"));
 }
 
-// Under the thread sanitizer this is what it looks at.
+// This test is meant for the thread sanitizer.
 TEST_F(UdpmTest, OthersMayPublishWhileMessagesAreHandled) {
   LcmBus bus(url);
   int count = 0;
@@ -220,14 +220,14 @@ int ReceiveBufferOf(const std::string& url) {
   return bytes;
 }
 
-// A user who leaves it out of the URL must not lose bursts.
+// Without a buffer size in the URL, bursts must not be lost either.
 TEST(UdpmUrl, WithoutABufferSizeTheSocketHasAsMuchAsInTheDefaultUrl) {
   const std::string url = "udpm://239.255.76.67:20011?ttl=0";
   EXPECT_EQ(ReceiveBufferOf(url), ReceiveBufferOf(url + "&recv_buf_size=4194304"));
   EXPECT_GT(ReceiveBufferOf(url), ReceiveBufferOf(url + "&recv_buf_size=100000"));
 }
 
-// More than net.core.rmem_max the kernel does not give.
+// The kernel grants at most net.core.rmem_max.
 TEST(UdpmUrl, ABufferSmallerThanAskedForIsSaidWithWhatToDo) {
   testing::internal::CaptureStderr();
   ReceiveBufferOf("udpm://239.255.76.67:20011?ttl=0&recv_buf_size=2000000000");

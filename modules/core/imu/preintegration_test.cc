@@ -72,7 +72,7 @@ TEST(Preintegration, TwoSpansComposeToOne) {
   EXPECT_LT((both.bias_jacobian - whole.result().bias_jacobian).norm(), 1e-9);
 }
 
-// The second span knew other biases: to first order that does not matter.
+// The second span was integrated with other biases; to first order the result is the same.
 TEST(Preintegration, ComposesSpansOfDifferentBiases) {
   const Eigen::Vector3d bias(1e-3, -1e-3, 2e-3), zero = Eigen::Vector3d::Zero();
   const Preintegration a = Integrate(200, zero, zero);

@@ -20,7 +20,7 @@ class Elementary : public testing::Test {
   std::mt19937_64 random_{1};
 };
 
-// In units of the last place.
+// The difference in units in the last place.
 double Off(double found, double exact) {
   const double size = std::abs(exact);
   return std::abs(found - exact) / (std::nextafter(size, 2 * size + 1) - size);

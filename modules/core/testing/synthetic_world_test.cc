@@ -35,7 +35,7 @@ TEST(SyntheticWorld, KeyframesAreComplete) {
   EXPECT_GT(points, 120 * 40u);
 }
 
-// The truth's points are where the keyframes say, within what their variances say.
+// The true points lie where the keyframes observe them, within the stated variances.
 TEST(SyntheticWorld, PointsAreAsNoisyAsTheyClaim) {
   const SyntheticWorld world = MakeSyntheticWorld({});
   double sum = 0;
