@@ -165,6 +165,7 @@ void AgentHandlerProcess::OnLinkUp(const std::string& channel, Bytes data) {
   }
   ++agent.packets;
   agent.heard_us = now_us_;
+  agent.new_uplink = agent.new_uplink || opened.new_uplink;
   if (!agent.handler && !archive_.MayJoin(agent_id)) {
     return;  // else the agent would be told that keyframes are kept which are not yet
   }
@@ -176,7 +177,7 @@ void AgentHandlerProcess::OnLinkUp(const std::string& channel, Bytes data) {
     node_.Refuse(fmt::format(
         "two uplinks run as agent {}: end one, or give it an id and a key of its own", agent_id));
   }
-  if (opened.new_uplink) {
+  if (std::exchange(agent.new_uplink, false)) {
     agent.handler->OnNewUplink();
     anchors_.OnNewSession(agent_id);
   }

@@ -46,6 +46,7 @@ class AgentHandlerProcess : public PolledProcess {
     std::optional<AgentHandler> handler;  // made by the first session
     int64_t packets = 0;                  // number of packets that were decrypted
     int64_t heard_us = 0;                 // when the newest of them came
+    bool new_uplink = false;              // opened a session that the handler was not told of
     int hellos_refused = 0;               // hellos refused since the last packet was decrypted
     int64_t bytes_up = 0;
     int64_t bytes_down = 0;

@@ -57,6 +57,23 @@ TEST_F(Replicated, NorDoesAHandlerThatStartsOnItsJournalAcknowledgeIt) {
   EXPECT_EQ(acknowledged, 9);
 }
 
+TEST_F(Replicated, AKeyThatComesBackWhileKeyframesAwaitReplicationIsServed) {
+  Run(2);
+  stores_ = false;
+  PublishKeyframes(5);
+  Run(5);
+  const std::filesystem::path elsewhere = folder / "key";
+  std::filesystem::rename(KeyFile(1), elsewhere);
+  Run(5);
+  std::filesystem::rename(elsewhere, KeyFile(1));
+  Run(10);
+  EXPECT_EQ(acknowledged, -1);
+  stores_ = true;
+  Run(10);
+  EXPECT_EQ(acknowledged, 4);
+  ExpectDelivered(5);
+}
+
 // Another host may have the site by then.
 TEST_F(Replicated, NobodyIsAnsweredWhileTheBridgeIsSilent) {
   Run(2);

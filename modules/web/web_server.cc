@@ -9,19 +9,26 @@
 #include "web/web_connection.h"
 
 namespace pangea::web {
+namespace {
+
+constexpr std::chrono::milliseconds kAcceptRetry{100};
+
+}  // namespace
 
 struct WebServer::Impl : ServerState {
   Impl(const WebOptions& web_options, WebSite& web_site)
-      : ServerState(web_options, web_site), acceptor(io) {}
+      : ServerState(web_options, web_site), acceptor(io), retry(io) {}
 
   void UseTls(const TlsIdentity& identity);
   void Listen();
   void Accept();
+  void AcceptLater();
   void Welcome(tcp::socket socket);
   void SendToPeers();
 
   std::optional<asio::ssl::context> tls;
   tcp::acceptor acceptor;
+  asio::steady_timer retry;
 };
 
 void WebServer::Impl::UseTls(const TlsIdentity& identity) {
@@ -73,7 +80,19 @@ void WebServer::Impl::Accept() {
     if (!error) {
       Welcome(std::move(socket));
     }
-    if (error != asio::error::operation_aborted) {
+    if (!error) {
+      Accept();
+    } else if (error != asio::error::operation_aborted) {
+      AcceptLater();
+    }
+  });
+}
+
+// Without a free file descriptor each attempt fails at once.
+void WebServer::Impl::AcceptLater() {
+  retry.expires_after(kAcceptRetry);
+  retry.async_wait([this](beast::error_code error) {
+    if (!error) {
       Accept();
     }
   });

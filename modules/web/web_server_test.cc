@@ -2,8 +2,12 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
+#include <ctime>
 #include <memory>
 #include <string>
 
@@ -275,6 +279,30 @@ TEST_F(WebServerTest, ANewConnectionTakesTheOldestsPlace) {
     reply({200, "text/plain", "late"});
   }
   Serve();
+}
+
+// A connection that cannot be accepted stays in the kernel's queue.
+TEST_F(WebServerTest, WithoutAFreeFileItNeitherSpinsNorForgetsWhoWaits) {
+  WebClient client(server_.port());
+  client.Send("GET / HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  rlimit files{};
+  ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &files), 0);
+  const int free_fd = dup(0);
+  close(free_fd);
+  rlimit none = files;
+  none.rlim_cur = static_cast<rlim_t>(free_fd);
+  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &none), 0);
+  const std::clock_t cpu_before = std::clock();
+  const auto before = std::chrono::steady_clock::now();
+  server_.Serve(300);
+  const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - before;
+  const double cpu_s = static_cast<double>(std::clock() - cpu_before) / CLOCKS_PER_SEC;
+  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &files), 0);
+  EXPECT_LT(cpu_s, 0.5 * wall.count());
+  bool closed = false;
+  EXPECT_EQ(client.Received(&closed), "");
+  server_.Serve(300);
+  EXPECT_THAT(client.Received(&closed), HasSubstr("<p>page"));
 }
 
 TEST_F(WebServerTest, AMalformedRequestGetsAnAnswerAndEndsTheConnection) {

@@ -118,8 +118,11 @@ bool UdpmReceiver::Enqueue(const UdpmAssembler::Message& message) {
   }
   std::vector<size_t> to = WithRoom(wanted);
   const size_t bytes = message.data.size() + kMessageOverhead;
-  if (to.empty() || queue_bytes_ + bytes > kMaxWaitingBytes) {
-    ++no_room_;
+  const bool fits = queue_bytes_ + bytes <= kMaxWaitingBytes;
+  if (!fits || to.size() < wanted.size()) {
+    ++no_room_;  // at least one subscription misses it
+  }
+  if (!fits || to.empty()) {
     return false;
   }
   for (const size_t subscription : to) {

@@ -121,6 +121,29 @@ TEST_F(UdpmTest, WhatWaitsIsBoundedAndTheNewestIsDropped) {
   EXPECT_EQ(bus.undelivered().no_room, 300);
 }
 
+TEST_F(UdpmTest, AMessageThatOneOfTwoSubscriptionsMissesIsCounted) {
+  LcmBus bus(url);
+  int heard = 0;
+  bus.Subscribe("A.*", [&](const std::string&, Bytes) { ++heard; });
+  int heard_b = 0;
+  bus.Subscribe(".*B", [&](const std::string&, Bytes) { ++heard_b; });
+  constexpr size_t kSent = UdpmReceiver::kMaxWaiting + 20;
+  for (size_t i = 0; i < kSent; ++i) {
+    bus.Publish("A", {});
+    if (i % 20 == 0) {  // the kernel keeps few
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+  }
+  bus.Publish("AB", {});
+  for (int i = 0; i < 500 && bus.undelivered().no_room < 21; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  Heard(&bus);
+  EXPECT_EQ(heard, static_cast<int>(UdpmReceiver::kMaxWaiting));
+  EXPECT_EQ(heard_b, 1);
+  EXPECT_EQ(bus.undelivered().no_room, 20 + 1);
+}
+
 TEST_F(UdpmTest, TheBytesThatWaitAreBounded) {
   LcmBus bus(url);
   int heard_large = 0;

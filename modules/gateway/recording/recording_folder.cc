@@ -64,8 +64,10 @@ fs::path RecordingFolder::NewName(int32_t agent_id) const {
 // Whether there is room for `bytes` and for the full size of all uploads that are under way.
 bool RecordingFolder::HasRoomFor(int64_t bytes) const {
   int64_t under_way = bytes;
+  int64_t unwritten = bytes;
   for (const auto& [agent_id, upload] : uploads_) {
     under_way += upload.bytes;
+    unwritten += upload.bytes - upload.written;
   }
   int64_t kept = 0;
   for (const auto& entry : fs::directory_iterator(folder_)) {
@@ -74,7 +76,7 @@ bool RecordingFolder::HasRoomFor(int64_t bytes) const {
     }
   }
   return kept + under_way <= max_bytes_ &&
-         static_cast<int64_t>(fs::space(folder_).available) - under_way >= kLeftOnDisk;
+         static_cast<int64_t>(fs::space(folder_).available) - unwritten >= kLeftOnDisk;
 }
 
 std::string RecordingFolder::Begin(int32_t agent_id, int64_t bytes) {
@@ -91,12 +93,14 @@ std::string RecordingFolder::Begin(int32_t agent_id, int64_t bytes) {
   if (fd < 0) {
     return kCannotWrite;
   }
-  uploads_[agent_id] = {fd, bytes};
+  uploads_[agent_id] = {fd, bytes, 0};
   return "";
 }
 
 std::string RecordingFolder::Write(int32_t agent_id, Bytes data) {
-  return WriteAll(uploads_.at(agent_id).fd, data) ? "" : kCannotWrite;
+  Upload& upload = uploads_.at(agent_id);
+  upload.written += static_cast<int64_t>(data.size());
+  return WriteAll(upload.fd, data) ? "" : kCannotWrite;
 }
 
 RecordingStore::Kept RecordingFolder::Finish(int32_t agent_id) {

@@ -32,6 +32,7 @@ class RecordingFolder : public RecordingStore {
   struct Upload {
     int fd = -1;
     int64_t bytes = 0;  // size of the finished file
+    int64_t written = 0;
   };
   std::filesystem::path PartOf(int32_t agent_id) const;
   std::filesystem::path NewName(int32_t agent_id) const;

@@ -9,7 +9,7 @@ import type { AnchorSaid } from "./protocol";
 import type { Stage } from "./stage";
 
 const kMaxListed = 200;
-const kMaxNameBytes = 100; // as messages carry
+const kMaxNameBytes = 50; // kMaxAnchorName of core/anchor.h
 const kClickPixels = 4; // a shorter movement of the pointer is a click and not a drag
 const kSure_ms = 3000; // time in which delete must be pressed again
 
