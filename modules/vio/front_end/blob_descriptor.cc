@@ -19,10 +19,10 @@ constexpr size_t kBins = 128;  // 4 x 4 histograms of 8 directions
 constexpr int kHalves = kDescriptorBits / static_cast<int>(kBins);
 static_assert(kHalves * kBins == kDescriptorBits);
 constexpr int kRounds = 2;
-// Lowe, section 5: gradients in a window of three sigmas times 1.5, 36 directions, and each that
-// has 0.8 of the strongest.
+// Lowe, section 5: gradients in a Gaussian window of 1.5 times the blob's sigma, cut off at three
+// sigmas of the window; 36 directions, and each with at least 0.8 of the strongest is used.
 constexpr int kDirections = 36;
-constexpr float kWindowOfDirection = 1.5F;  // sigma, in the blob's
+constexpr float kWindowOfDirection = 1.5F;  // sigma of the window, in the blob's sigmas
 constexpr float kOtherDirection = 0.8F;
 // Section 6: 4 x 4 histograms of 8 directions, each three sigmas wide.
 constexpr int kCells = 4;
@@ -31,13 +31,13 @@ static_assert(kCells * kCells * kCellDirections == kBins);
 constexpr float kCellWidth = 3;  // in the blob's sigmas
 constexpr float kMostOfABin = 0.2F;
 constexpr float kLength = 512;
-// Gradients are taken at this distance, in the blob's sigmas: finer than the image is smooth.
+// Distance between gradient samples, in the blob's sigmas: finer than the image is smooth.
 constexpr float kStep = 0.75F;
 
 using Bins = std::array<int, kBins>;
 using Histogram = std::array<float, kBins>;
 
-// The same on every machine: the standard says what this generator gives.
+// The same on every machine: the C++ standard defines the output of this generator.
 std::array<std::array<Bins, kRounds>, kHalves> RandomSigns() {
   std::mt19937 generator(1);
   std::array<std::array<Bins, kRounds>, kHalves> signs;
@@ -51,7 +51,7 @@ std::array<std::array<Bins, kRounds>, kHalves> RandomSigns() {
   return signs;
 }
 
-// In place, not normalised.
+// Transforms in place, without normalisation.
 void HadamardTransform(Bins* bins) {
   for (size_t step = 1; step < kBins; step *= 2) {
     for (size_t block = 0; block < kBins; block += 2 * step) {
@@ -66,11 +66,11 @@ void HadamardTransform(Bins* bins) {
 }
 
 struct WindowSample {
-  float x = 0, y = 0;  // from the blob's centre, steps
+  float x = 0, y = 0;  // offset from the blob's centre, in steps
   float weight = 0;
 };
 
-// The inner samples of a GradientPatch, row by row, under a Gaussian.
+// The inner samples of a GradientPatch, row by row, with Gaussian weights.
 std::vector<WindowSample> GaussianWindow(int half_side, float sigma) {
   std::vector<WindowSample> window;
   for (int row = 0; row < 2 * half_side; ++row) {
@@ -86,8 +86,8 @@ std::vector<WindowSample> GaussianWindow(int half_side, float sigma) {
 constexpr int kMostSide = 32;  // samples in a row of a patch
 constexpr int SideOf(int half_side) { return 2 * half_side + 2; }
 
-// Of an image at equal steps along a row, whose middle is `across` from the centre. The rim goes on
-// outside.
+// Samples the image at equal steps along a row, whose middle is `across` from the centre. Outside
+// the image the rim's pixels are repeated.
 PANGEA_VECTOR_CLONES
 void InterpolateRow(const cv::Mat& level, const Eigen::Vector2f& centre,
                     const Eigen::Vector2f& along, const Eigen::Vector2f& across,
@@ -122,7 +122,7 @@ void InterpolateRow(const cv::Mat& level, const Eigen::Vector2f& centre,
   }
 }
 
-// Gradients around a blob on a square grid that is rotated by `direction`, in its frame.
+// Gradients around a blob on a square grid that is rotated by `direction`, in the grid's axes.
 class GradientPatch {
  public:
   GradientPatch(const ScaleSpace& space, const Blob& blob, float direction, int half_side)
@@ -142,7 +142,7 @@ class GradientPatch {
     }
   }
 
-  // For each inner sample: its place in the window, gradient.
+  // Calls function(sample of the window, gradient x, gradient y) for each inner sample.
   template <typename Function>
   void ForEach(const std::vector<WindowSample>& window, Function function) const {
     auto sample = window.begin();
@@ -159,13 +159,13 @@ class GradientPatch {
   std::vector<float> values_;
 };
 
-// From 0 up to, not including, `directions`.
+// Returns a value from 0 to below `directions`.
 float DirectionBin(float gradient_x, float gradient_y, int directions) {
   const float bin = cv::fastAtan2(gradient_y, gradient_x) * static_cast<float>(directions) / 360.F;
   return bin < static_cast<float>(directions) ? bin : 0.F;
 }
 
-// The strongest and others about as strong; radians.
+// Returns the strongest direction and others about as strong; radians.
 std::vector<float> DirectionsOf(const ScaleSpace& space, const Blob& blob) {
   constexpr float kSigma = kWindowOfDirection / kStep;  // steps
   constexpr int kHalfSide = static_cast<int>(3 * kSigma);
@@ -219,7 +219,7 @@ void AddGradient(float x, float y, float direction, float weight, Histogram* his
   }
 }
 
-// No bin over 0.2 of the length (Lowe, section 6.1), then of the length 512.
+// Limits each bin to 0.2 of the length (Lowe, section 6.1), then scales the length to 512.
 void Normalise(Histogram* histogram) {
   Eigen::Map<Eigen::Matrix<float, kBins, 1>> bins(histogram->data());
   bins.normalize();
@@ -249,7 +249,7 @@ Histogram HistogramOf(const ScaleSpace& space, const Blob& blob, float direction
 
 Descriptor SignsOfProjections(std::span<const float> histogram) {
   static const auto kSigns = RandomSigns();
-  // Whole numbers. Without their mean, which all histograms have in common.
+  // Integers, without the histogram's mean, which is the same for all histograms.
   Bins centred;
   std::transform(histogram.begin(), histogram.end(), centred.begin(), [](float x) {
     return static_cast<int>(std::lround(static_cast<float>(kBins) * x));
@@ -263,7 +263,7 @@ Descriptor SignsOfProjections(std::span<const float> histogram) {
     for (const Bins& signs : half) {
       std::transform(bins.begin(), bins.end(), signs.begin(), bins.begin(), std::multiplies<>());
       HadamardTransform(&bins);
-      // The second transform would leave the range of int.
+      // Without this division the second transform would overflow int.
       std::for_each(bins.begin(), bins.end(), [](int& x) { x /= 16; });
     }
     for (const int x : bins) {

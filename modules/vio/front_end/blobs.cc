@@ -11,7 +11,7 @@ namespace pangea::vio {
 namespace {
 
 constexpr int kMaxOctave = 15;
-// Blobs of this diameter are as well placed as corners on octave 0.
+// Blobs of this diameter are located as precisely as corners on octave 0.
 constexpr double kSureDiameter_px = 8;
 
 int OctaveOf(double diameter_px) {

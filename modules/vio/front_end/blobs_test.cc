@@ -42,7 +42,7 @@ TEST(Blobs, AreWhereTheyAre) {
   }
 }
 
-// An octave of ours is a factor of 1.2.
+// An octave in this project is a factor of 1.2.
 TEST(Blobs, OctavesGrowWithTheSize) {
   const auto octave = [](double sigma_px) {
     return DescribeBlobs(ImageOfOneBlob(300, 200, sigma_px), 1, kCell_px)[0].octave;
@@ -50,7 +50,7 @@ TEST(Blobs, OctavesGrowWithTheSize) {
   EXPECT_NEAR(octave(20) - octave(10), std::log(2) / std::log(kOctaveScale), 1);
 }
 
-// It is anywhere along itself.
+// A line has no definite position along itself.
 TEST(Blobs, ALineIsNone) {
   cv::Mat image(480, 640, CV_8U);
   for (int u = 0; u < image.cols; ++u) {
@@ -84,7 +84,7 @@ TEST(SpreadOver, TakesTheStrongestOfEachCellFirst) {
   EXPECT_EQ(responses, (std::vector<float>{5, 1, 4}));
 }
 
-// What corners do not survive: twice as far, and rolled.
+// Corners do not survive this: the camera is twice as far away, and rolled.
 TEST(Blobs, AreFoundAgainFromTwiceAsFar) {
   const cv::Mat near = RandomTexture(752, 480, 5);
   cv::Mat far(480, 752, CV_8U, cv::Scalar(128));

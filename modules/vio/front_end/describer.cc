@@ -20,17 +20,17 @@ static_assert(kDescriptorBits == 256, "what ORB makes");
 constexpr int kPatchRadius = 15;
 constexpr int kBorder = 23;
 constexpr float kPatchSize = 31.F;
-// Grey levels; the low one in cells where the other finds nothing.
+// Grey levels; the low one is for cells in which the other finds nothing.
 constexpr int kFastThreshold = 20;
 constexpr int kLowFastThreshold = 7;
-// How far, on its octave, a tracked landmark may lie from the corner it is described at.
+// Largest distance, on its octave, from a tracked landmark to the corner at which it is described.
 constexpr float kSnapRadius = 2.F;
-// From a keyframe to one 3.6 times as far away (kOctaveScale to the seventh).
+// Enough to match a keyframe with one 3.6 times as far away (kOctaveScale to the seventh).
 constexpr int kOctaves = 8;
-constexpr int kCell_px = 40;  // that corners are spread over, on each octave
+constexpr int kCell_px = 40;  // corners are spread over cells of this size, on each octave
 
-// Half width of each row of the disc, the same in both directions so that rotating the patch
-// rotates the centroid.
+// Half width of each row of the disc. By the rounding, the disc is only nearly the same in both
+// directions.
 std::array<int, kPatchRadius + 1> DiscHalfWidths() {
   std::array<int, kPatchRadius + 1> widths{};
   for (int v = 0; v <= kPatchRadius; ++v) {
@@ -39,7 +39,7 @@ std::array<int, kPatchRadius + 1> DiscHalfWidths() {
   return widths;
 }
 
-// Whoever takes only the first of them gets some of each.
+// A receiver that takes only the first of them gets some of each.
 void Alternate(std::span<const Corner> a, std::span<const Corner> b, std::vector<Corner>* out) {
   for (size_t i = 0; i < std::max(a.size(), b.size()); ++i) {
     for (const auto& list : {a, b}) {
@@ -55,7 +55,7 @@ void Alternate(std::span<const Corner> a, std::span<const Corner> b, std::vector
 Describer::Describer(const CameraModel& camera, const DescriberOptions& options)
     : camera_(camera),
       options_(options),
-      // One level: it takes the corners of a given octave as they are.
+      // With one level ORB takes the corners of a given octave as they are.
       orb_(cv::ORB::create(1, static_cast<float>(kOctaveScale), 1, kPatchRadius, 0, 2)) {
   for (int octave = 0; octave < kOctaves; ++octave) {
     scales_.push_back(std::pow(kOctaveScale, octave));
@@ -77,8 +77,8 @@ void Describer::BuildPyramid(const cv::Mat& image) {
   }
 }
 
-// Corners in a part of an octave by the low threshold. FAST looks 3 px around a pixel, and its
-// neighbours' responses count.
+// Finds corners in a part of an octave with the low threshold. FAST looks 3 px around a pixel, and
+// compares the responses of neighbours.
 std::vector<cv::KeyPoint> Describer::WeakCorners(int octave, const cv::Rect& part) const {
   constexpr int kReach = 4;
   const cv::Mat& level = pyramid_[octave];
@@ -125,7 +125,7 @@ std::vector<Describer::Candidate> Describer::FindCorners(int octave, int wanted)
       candidates.push_back(candidate);
     }
   }
-  // Row by row, as equal ones are chosen in this order.
+  // Sorted row by row, as corners of equal response are chosen in this order.
   std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
     return std::pair(a.level_pixel.y, a.level_pixel.x) <
            std::pair(b.level_pixel.y, b.level_pixel.x);
@@ -148,7 +148,8 @@ float Describer::StrongestNear(const std::vector<cv::KeyPoint>& corners,
   return best;
 }
 
-// On the octave where it is the strongest corner; nothing too close to the rim.
+// Places it on the octave where it is the strongest corner; returns nothing if too close to the
+// rim.
 std::optional<Describer::Candidate> Describer::Place(const Eigen::Vector2f& pixel,
                                                      bool weak_too) const {
   std::optional<Candidate> best;
@@ -262,15 +263,14 @@ std::vector<Corner> Describer::Compute(const std::vector<Candidate>& candidates)
   return corners;
 }
 
-// Octaves share what is wanted by their side length, as a corner's density in the image would have
-// it.
+// The octaves share the wanted number in proportion to their side length.
 std::vector<Describer::Candidate> Describer::FindCorners(int wanted) const {
   double share_sum = 0;
   for (const double scale : scales_) {
     share_sum += 1.0 / scale;
   }
   std::vector<Candidate> corners;
-  double carried_over = 0;  // what coarser octaves could not use goes to the finer ones
+  double carried_over = 0;  // number that the coarser octaves did not use; the finer ones get it
   for (int octave = static_cast<int>(scales_.size()) - 1; octave >= 0; --octave) {
     carried_over += wanted / scales_[octave] / share_sum;
     const auto found =

@@ -35,8 +35,8 @@ struct Tally {
   }
 };
 
-// How many of the matches agree with one motion near the true one. The true rotation itself is only
-// good to about a degree on real recordings, so it is a guess, refined by the matches.
+// The number of matches that agree with one motion near the true one. On real recordings the true
+// rotation is only known to about a degree, so it is the initial guess, refined by the matches.
 int Consistent(const CameraModel& camera, const View& a, const View& b,
                const std::vector<CornerMatch>& matches) {
   std::vector<Eigen::Vector2d> rays_a, rays_b;
@@ -61,7 +61,7 @@ struct Views {
   double corners = 0;
 };
 
-// One each `step_s` seconds, where the truth is known.
+// One view each `step_s` seconds, where the truth is known.
 Views DescribeAll(const EurocRecording& recording, double step_s, bool landmarks) {
   const CameraModel& camera = recording.camera();
   Tracker tracker(camera, {});
@@ -80,7 +80,7 @@ Views DescribeAll(const EurocRecording& recording, double step_s, bool landmarks
       std::cerr << fmt::format("{}\n", why);
       continue;
     }
-    // Fresh features stand for the tracked ones: where the tracker would put them.
+    // New features stand for tracked ones, at the places where the tracker would put them.
     tracker.Reset();
     const TrackedFrame& frame = tracker.Track(entry.utime, image, Eigen::Quaterniond::Identity());
     const std::clock_t begin = std::clock();
@@ -95,13 +95,13 @@ Views DescribeAll(const EurocRecording& recording, double step_s, bool landmarks
 struct Tallies {
   Tally near, revisit, unlike;
 
-  // Where two views count; null: nowhere.
+  // The tally that counts two views; null if none does.
   Tally* Of(const View& a, const View& b) {
     const double dt = b.time_s - a.time_s;
     const Rigid3 T_a_b = a.T_reference_cam.Inverse() * b.T_reference_cam;
     const double angle = T_a_b.q.angularDistance(Eigen::Quaterniond::Identity());
     if (T_a_b.t.norm() < 0.05) {
-      return nullptr;  // the epipolar line says nothing
+      return nullptr;  // too short a baseline for an epipolar line
     }
     if (dt < 1.3) {
       return &near;

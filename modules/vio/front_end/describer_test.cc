@@ -40,14 +40,14 @@ TEST(Describer, PutsEveryLandmarkFirstWithItsPixel) {
     EXPECT_EQ(corner.pixel, frame.observations[observation].pixel);
     ++landmarks;
   }
-  // All but those at the image's rim, where no descriptor fits.
+  // All landmarks except those at the image's rim, where no descriptor fits.
   EXPECT_GE(landmarks, frame.observations.size() * 8 / 10);
   for (size_t i = landmarks; i < corners.size(); ++i) {
     EXPECT_EQ(corners[i].landmark_id, kNoLandmark);
   }
 }
 
-// A link that carries only some of them takes the first.
+// A link that carries only some of the corners takes the first.
 TEST(Describer, BlobsAndCornersTakeTurns) {
   DescriberOptions options;
   options.max_blobs = 0;
@@ -80,7 +80,7 @@ TEST(Describer, CoversTheImageAndSeveralOctaves) {
   EXPECT_GT(octave[3], 20);
 }
 
-// Mutual nearest neighbours between two views, and how many are within 3 px of the truth.
+// Matches two views by mutual nearest neighbours; returns the share within 3 px of the truth.
 double CorrectShare(const cv::Mat& a, const cv::Mat& b, const Eigen::Quaterniond& q_b_a,
                     int* matches) {
   Describer describer(PlainCamera(), {});

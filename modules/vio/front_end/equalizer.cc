@@ -11,19 +11,19 @@
 namespace pangea::vio {
 namespace {
 
-constexpr int kOne = 128;  // a weight of 1: a grey value times it fits 16 bits
+constexpr int kOne = 128;  // stands for a weight of 1; a grey value times it fits 16 bits
 
 // The rows (or columns) between the centres of two neighbouring tiles; beyond the outermost centre
 // there is one tile only.
 struct Strip {
   int begin = 0, end = 0;
-  int first = 0, second = 0;  // tile
+  int first = 0, second = 0;  // the tiles that are blended
 };
 
 std::vector<Strip> StripsOf(int size, int tiles) {
   std::vector<Strip> strips;
   for (int k = 0; k <= tiles; ++k) {
-    const auto centre = [&](int tile) {  // the first pixel that is not before it
+    const auto centre = [&](int tile) {  // the first pixel at or after it
       return ((2 * tile + 1) * size + 2 * tiles - 1) / (2 * tiles);
     };
     strips.push_back({k == 0 ? 0 : centre(k - 1), k == tiles ? size : centre(k), std::max(k - 1, 0),
@@ -38,14 +38,14 @@ int16_t WeightAt(int i, int size, int tiles) {
   return static_cast<int16_t>(cvRound(kOne * (at - std::floor(at))));
 }
 
-// Of each pixel the two values of its grey value.
+// For each pixel: the two values of its grey value.
 void LookUp(const int16_t* pairs, const uint8_t* grey, int count, int16_t* out) {
   for (int i = 0; i < count; ++i) {
     std::memcpy(out + 2 * i, pairs + 2 * grey[i], 2 * sizeof(int16_t));
   }
 }
 
-// Two tables, the values of a grey value one beside the other.
+// Interleaves two tables: a grey value's two values are neighbours.
 PANGEA_VECTOR_CLONES
 void Interleave(std::span<const int16_t> first, std::span<const int16_t> second,
                 std::span<int16_t> out) {
@@ -55,14 +55,14 @@ void Interleave(std::span<const int16_t> first, std::span<const int16_t> second,
   }
 }
 
-// Of each pixel the sum of its two values by their weights.
+// For each pixel: the weighted sum of its two values.
 PANGEA_VECTOR_CLONES
 void BlendRow(const std::vector<int16_t>& values, const std::vector<int16_t>& weights,
               uint8_t* out) {
   constexpr int kShift = 14, kHalf = kOne * kOne / 2;
   static_assert(1 << kShift == kOne * kOne);
   const size_t width = values.size() / 2;
-  const auto sums = [&](size_t x) {  // of four pixels
+  const auto sums = [&](size_t x) {  // sums of four pixels
     const cv::v_int32x4 sum =
         cv::v_dotprod(cv::v_load(&values[2 * x]), cv::v_load(&weights[2 * x]));
     return (sum + cv::v_setall_s32(kHalf)) >> kShift;
@@ -81,7 +81,8 @@ void BlendRow(const std::vector<int16_t>& values, const std::vector<int16_t>& we
 }  // namespace
 
 Equalizer::Table Equalizer::TableOf(const cv::Mat& tile) const {
-  // Two, for neighbours are often alike, and a count must be written before it is read again.
+  // Two histograms: neighbours are often equal, and a count must be written before it is read
+  // again.
   std::array<int, kGreys> histogram{}, of_odd{};
   for (int y = 0; y < tile.rows; ++y) {
     const uint8_t* row = tile.ptr<uint8_t>(y);
@@ -97,7 +98,7 @@ Equalizer::Table Equalizer::TableOf(const cv::Mat& tile) const {
   for (int grey = 0; grey < kGreys; ++grey) {
     histogram[grey] += of_odd[grey];
   }
-  // What is above the limit is spread over all grey values, the remainder at even steps.
+  // Counts above the limit are spread over all grey values, the remainder at even steps.
   const int area = tile.rows * tile.cols;
   const int limit = std::max(1, static_cast<int>(clip_ * area / kGreys));
   int above = 0;
@@ -142,14 +143,14 @@ cv::Mat Equalizer::Apply(const cv::Mat& image) {
     }
   }
   const std::vector<Strip> columns = StripsOf(width, kTiles);
-  std::vector<int16_t> weights(2 * static_cast<size_t>(width));  // of a pixel's two tables
+  std::vector<int16_t> weights(2 * static_cast<size_t>(width));  // weights of a pixel's two tables
   for (int x = 0; x < width; ++x) {
     weights[2 * x + 1] = WeightAt(x, width, kTiles);
     weights[2 * x] = static_cast<int16_t>(kOne - weights[2 * x + 1]);
   }
   cv::Mat out(image.size(), CV_8U);
-  // The tables at a row's height, of all columns of tiles; then of each strip the two that its
-  // pixels blend, one beside the other.
+  // For each column of tiles: the table at a row's height. Then for each strip: the two tables that
+  // its pixels blend, interleaved.
   std::array<std::array<int16_t, kGreys>, kTiles> of_row;
   std::array<int16_t, 2 * kGreys> pairs;
   std::vector<int16_t> of_pixels(2 * static_cast<size_t>(width));
@@ -164,7 +165,7 @@ cv::Mat Equalizer::Apply(const cv::Mat& image) {
         LookUp(pairs.data(), image.ptr<uint8_t>(y) + strip.begin, strip.end - strip.begin,
                &of_pixels[2 * static_cast<size_t>(strip.begin)]);
       }
-      // Apart from the look-ups: only this can be vector instructions.
+      // Separate from the look-ups: only the blending can use vector instructions.
       BlendRow(of_pixels, weights, out.ptr<uint8_t>(y));
     }
   }

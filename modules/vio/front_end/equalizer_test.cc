@@ -9,7 +9,7 @@
 namespace pangea::vio {
 namespace {
 
-// OpenCV blends the same tables in floating point; here a weight is a whole number of 128ths.
+// OpenCV blends the same tables in floating point; here weights are integers, in 128ths.
 TEST(Equalizer, IsOpenCvsToTwoGreyLevels) {
   for (const double clip : {0.5, 3.0, 40.0}) {
     cv::Mat image = RandomTexture(752, 480, 1);

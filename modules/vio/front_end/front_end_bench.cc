@@ -103,7 +103,7 @@ struct Options {
   double start = 0;
   double duration = 1e9;
   std::vector<double> gyro_bias = {0, 0, 0};
-  double time_offset = 0;  // added to the images' time when the ground truth is asked
+  double time_offset = 0;  // added to the images' time to look up the ground truth
   TrackerOptions tracker;
 };
 
@@ -167,7 +167,7 @@ struct TrackErrors {
   int bad = 0, measured = 0;
 };
 
-// As the estimator's window does: at most 20 views at a time.
+// Like the estimator's window: at most 20 views at a time.
 TrackErrors ErrorsOf(const std::map<int32_t, std::vector<View>>& tracks, double pixel_angle) {
   constexpr size_t kLeastViews = 5, kMostViews = 20;
   TrackErrors errors;

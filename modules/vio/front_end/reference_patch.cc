@@ -16,29 +16,29 @@ namespace {
 
 constexpr int kIterations = 10;
 constexpr float kConverged_px = 0.02F;
-// Correction of what image-to-image tracking says, beyond which it is another place.
+// Largest correction of the result of image-to-image tracking; beyond it lies another place.
 constexpr float kMaxCorrection_px = 2.0F;
-// Correlation of the patch with what is found.
+// Smallest accepted correlation of the patch with the image.
 constexpr float kMinCorrelation = 0.85F;
-// Singular values of a deformation that is still the same patch.
+// Limits of the singular values of a deformation; beyond them it is not the same patch.
 constexpr float kMinStretch = 0.6F;
 constexpr float kMaxStretch = 1.7F;
-// Standard deviations of grey values that are texture, not noise.
+// Smallest standard deviation of grey values that counts as texture, not noise.
 constexpr float kMinContrast = 2.0F;
-// The deformation changes little from image to image: weight of that against the patch's own
-// gradients, whose position columns have this relative to them.
+// Weight of the prior that the deformation changes little from image to image. It is relative to
+// the position columns of the patch's own gradients.
 constexpr float kStiffness = 0.02F;
-constexpr int kPadded = 24;     // a row of the largest patch, in eights
-constexpr float kTiny = 1e-9F;  // keeps the normal matrix of stripes invertible
+constexpr int kPadded = 24;     // row of the largest patch, rounded up to eights
+constexpr float kTiny = 1e-9F;  // keeps the normal matrix of striped patches invertible
 
-// At any address: OpenCV's v_lut_pairs reads a short there, which is undefined at odd ones.
+// Works at any address: OpenCV's v_lut_pairs reads a short, which is undefined at odd addresses.
 uint16_t PairAt(const uchar* grey) {
   uint16_t pair = 0;
   std::memcpy(&pair, grey, sizeof(pair));
   return pair;
 }
 
-// Of eight pixels and their right neighbours, blended by `share` of the neighbour.
+// Eight pixels, each blended with its right neighbour, which has the weight `share`.
 [[gnu::always_inline]] inline std::array<cv::v_float32x4, 2> BlendPairs(const uchar* grey,
                                                                         const int* offset,
                                                                         const float* share) {
@@ -59,8 +59,8 @@ uint16_t PairAt(const uchar* grey) {
   return blended;
 }
 
-// Values at A x + at for the pixels x of a patch of `side` pixels a side, row by row; false if they
-// are not all inside.
+// Samples the image at A x + at for the pixels x of a patch of `side` x `side` pixels, row by row;
+// returns false if they are not all inside the image.
 PANGEA_VECTOR_CLONES
 bool Sample(const cv::Mat& image, const Eigen::Vector2f& at, const Eigen::Matrix2f& a, int side,
             float* values) {
@@ -72,7 +72,7 @@ bool Sample(const cv::Mat& image, const Eigen::Vector2f& at, const Eigen::Matrix
         at.y() + reach_y < static_cast<float>(image.rows - 1))) {
     return false;
   }
-  // Row by row, eight pixels at a time; the last of a row is read again for those beyond it.
+  // Reads each row eight pixels at a time, and repeats its last pixel for those beyond it.
   const auto step = static_cast<int>(image.step);
   std::array<int, kPadded> offset;
   std::array<float, kPadded> fx, fy, grey;
@@ -116,7 +116,7 @@ float ReferencePatch::Normalise(Values* values) {
 std::optional<ReferencePatch> ReferencePatch::Take(const cv::Mat& image,
                                                    const Eigen::Vector2f& pixel) {
   ReferencePatch patch;
-  // A pixel more on each side, for its derivatives.
+  // One pixel more on each side, for the derivatives.
   constexpr int kSide = kSize + 2;
   static_assert(kSide <= kPadded);
   using Square = Eigen::Array<float, kSide, kSide, Eigen::RowMajor>;
@@ -142,7 +142,7 @@ std::optional<ReferencePatch> ReferencePatch::Take(const cv::Mat& image,
     const float x = gx.data()[i], y = gy.data()[i];
     patch.jacobian_.row(i) << x, y, x * u, y * u, x * v, y * v;
   }
-  // Normalising makes the look blind to brightness and contrast: so is its derivative.
+  // Normalising makes the patch independent of brightness and contrast; the derivative must be too.
   for (int column = 0; column < 6; ++column) {
     auto j = patch.jacobian_.col(column);
     j.array() -= j.mean();
@@ -165,8 +165,7 @@ std::optional<Eigen::Vector2f> ReferencePatch::Find(const cv::Mat& image,
       return std::nullopt;
     }
     const Eigen::Matrix<float, 6, 1> step = gain_ * (jacobian_.transpose() * (values - look_));
-    // The patch itself would have to move by `step` to look like what is seen: the warp takes its
-    // inverse.
+    // `step` would move the patch itself to look like the image; so the warp takes its inverse.
     Eigen::Matrix2f da;
     da << 1 + step[2], step[4], step[3], 1 + step[5];
     const Eigen::Matrix2f da_inverse = da.inverse();
@@ -180,7 +179,7 @@ std::optional<Eigen::Vector2f> ReferencePatch::Find(const cv::Mat& image,
       break;
     }
   }
-  // What was sampled last is a step from there that no longer counts.
+  // `values` were sampled before the last step, which is too small to matter.
   if (!(values.dot(look_) >= kMinCorrelation)) {
     return std::nullopt;
   }

@@ -13,8 +13,8 @@ namespace {
 constexpr int kWidth = 160, kHeight = 120;
 const Eigen::Vector2f kAt(80.3F, 60.8F);
 
-// A smooth texture without an image's own sampling: waves of 12 to 60 px in all directions. What is
-// at kAt is seen at kAt + shift, deformed by A.
+// A smooth texture that is computed, not resampled: waves of 12 to 60 px in all directions. The
+// point at kAt appears at kAt + shift, deformed by A.
 cv::Mat Waves(const Eigen::Matrix2f& a, const Eigen::Vector2f& shift) {
   const Eigen::Matrix2f a_inverse = a.inverse();
   cv::Mat image(kHeight, kWidth, CV_8U);
@@ -55,7 +55,7 @@ TEST(ReferencePatch, FindsItselfMovedRotatedStretchedAndDarker) {
   EXPECT_LT((*found - kAt - shift).norm(), 0.03);
 }
 
-// The step is Gauss-Newton on the patch's own derivative: near the truth one image with a known
+// Each step is Gauss-Newton with the patch's own derivative: near the truth an image with a known
 // small deformation must be found exactly, in each of the six directions.
 TEST(ReferencePatch, EachDirectionOfItsDerivativeIsRight) {
   const cv::Mat image = Waves(kAsItWas, {0, 0});

@@ -17,7 +17,7 @@ constexpr int kLayers = 2;
 constexpr double kFirstSigma_px = 1.6;
 constexpr double kSigmaOfAnImage_px = 0.5;
 constexpr float kMaxRatioOfCurvatures = 10;
-// Less than his 0.03: white walls have little.
+// Less than Lowe's 0.03, because white walls have little contrast.
 constexpr float kLeastContrast = 0.01F;
 constexpr int kRim_px = 5;
 constexpr int kMinSide_px = 24;
@@ -46,7 +46,7 @@ double SigmaOfLayer(double layer) { return kFirstSigma_px * std::pow(2.0, layer 
 
 using Layers = std::vector<cv::Mat>;
 
-// Of a maximum (sign 1) or minimum (-1).
+// Whether the pixel is a maximum (sign 1) or minimum (-1).
 bool IsExtremum(const Layers& differences, int layer, int y, int x, float sign) {
   const float value = sign * differences[layer].at<float>(y, x);
   for (const int l : {layer, layer - 1, layer + 1}) {
@@ -61,7 +61,7 @@ bool IsExtremum(const Layers& differences, int layer, int y, int x, float sign) 
 }
 
 struct Derivatives {
-  Eigen::Vector3f gradient;  // by x, y, layer
+  Eigen::Vector3f gradient;  // with respect to x, y, layer
   Eigen::Matrix3f hessian;
 };
 
@@ -93,8 +93,8 @@ bool IsEdge(const Eigen::Matrix3f& hessian) {
   return determinant <= 0 || trace * trace * r >= (r + 1) * (r + 1) * determinant;
 }
 
-// Where a parabola through the neighbours has its extremum (Brown and Lowe, BMVC 2002), in pixels
-// of the octave. None where that is nearer to another pixel or layer.
+// Fits a parabola through the neighbours (Brown and Lowe, BMVC 2002); returns its extremum in
+// pixels of the octave. Returns nothing if that is too far away, of low contrast or on an edge.
 std::optional<Blob> Refine(const Layers& differences, int layer, int y, int x) {
   const Derivatives d = DerivativesAt(differences, layer, y, x);
   const Eigen::Vector3f offset = -d.hessian.fullPivLu().solve(d.gradient);
@@ -113,12 +113,12 @@ std::optional<Blob> Refine(const Layers& differences, int layer, int y, int x) {
   return blob;
 }
 
-// Which pixels of a row surpass their four neighbours: 1 above, -1 below, 0 neither. Without
-// branches, as it is done for every pixel.
+// Signs of a row's pixels: 1 if no neighbour of the four is above, -1 if none is below, else 0; 0
+// also for a low contrast. Without branches, as it is done for every pixel.
 PANGEA_VECTOR_CLONES
 void ComparePixels(const float* above, const float* row, const float* below, int columns,
                    int8_t* sign) {
-  constexpr float kLeast = 0.5F * kLeastContrast;  // the fit may add to what a pixel has
+  constexpr float kLeast = 0.5F * kLeastContrast;  // half, as the fit may increase a pixel's value
   for (int x = kRim_px; x < columns - kRim_px; ++x) {
     const float most = std::max(std::max(row[x - 1], row[x + 1]), std::max(above[x], below[x]));
     const float least = std::min(std::min(row[x - 1], row[x + 1]), std::min(above[x], below[x]));
@@ -128,7 +128,7 @@ void ComparePixels(const float* above, const float* row, const float* below, int
   }
 }
 
-// From `x` on the first of them that is not 0, or `end`. Eight at a time, as few are not.
+// The first index from `x` on with a sign that is not 0, or `end`. Skips eight zeros at a time.
 int NextOf(const std::vector<int8_t>& signs, int x, int end) {
   for (uint64_t eight = 0; x + 8 <= end; x += 8) {
     std::memcpy(&eight, &signs[static_cast<size_t>(x)], sizeof(eight));
@@ -160,8 +160,8 @@ void FindInLayer(const Layers& differences, int layer, std::vector<Blob>* blobs)
   }
 }
 
-// The image, and each next one smoother by the same ratio; the last but two has twice the first's
-// sigma.
+// The image, then images that are each smoother by the same ratio; the last but two has twice the
+// sigma of the first.
 Layers SmoothedLayers(const cv::Mat& first) {
   Layers smoothed{first};
   for (int layer = 1; layer < kLayers + 3; ++layer) {

@@ -10,42 +10,43 @@ namespace pangea::vio {
 namespace {
 
 constexpr int kCornerBlock_px = 5;
-// From products of the pyramid's derivatives (Scharr's filter) to the units of
+// Converts products of the pyramid's derivatives (Scharr's filter) to the units of
 // cv::cornerMinEigenVal.
 constexpr float kGradientScale = 1.F / (4 * 4 * 5 * 255.F) / (4 * 4 * 5 * 255.F);
-// Of the image's strongest corner, from one image to the next.
+// Decay of the response of the strongest corner from one image to the next.
 constexpr double kStrongestKept = 0.98;
-// Features may come closer to each other while tracked than they were found, down to this share.
+// Tracked features may come closer to each other than new ones, down to this share of the distance.
 constexpr double kMergeShare = 0.4;
 
-// Cells of the image that features are spread over.
+// Features are spread over these cells of the image.
 constexpr int kGridColumns = 15;
 constexpr int kGridRows = 10;
-constexpr double kBorder_px = 8;  // of the image without features
-// A corner's smaller eigenvalue against the image's strongest one, and the least at all (of a
-// contrast-equalised image, OpenCV's units).
+constexpr double kBorder_px = 8;  // rim of the image without features
+// Least value of a corner's smaller eigenvalue: relative to the image's strongest one, and absolute
+// (of a contrast-equalised image, OpenCV's units).
 constexpr double kQuality = 0.01;
 constexpr double kMinEigenvalue = 1e-4;
 constexpr double kObservationSigma_px = 0.5;
 
-// While this share of the features is there, each empty cell is searched in one image of so many.
+// While at least this share of the features exists, an empty cell is searched once in kTurns
+// images.
 constexpr double kEnoughShare = 0.5;
 constexpr int kTurns = 3;
 
 constexpr int kKltWindow_px = 21;
-constexpr int kKltLevels = 4;  // with the image itself
+constexpr int kKltLevels = 4;  // including the image itself
 constexpr int kKltIterations = 20;
 constexpr double kKltConverged_px = 0.03;
-// Between a feature and itself tracked back.
+// Largest distance between a feature and itself tracked back.
 constexpr double kMaxForwardBackward_px = 0.7;
-// Contrast limit of the histogram equalisation: dark corners of a room have features too.
+// Contrast limit of the histogram equalisation, which gives dark corners of a room features too.
 constexpr double kEqualizerClip = 3.0;
 
 Eigen::Vector2d ToEigen(const cv::Point2f& p) { return {p.x, p.y}; }
 
 Eigen::Vector2f ToEigenF(const cv::Point2f& p) { return {p.x, p.y}; }
 
-// Without the root, as it is asked of each pair.
+// Compares squares, as it is called for each pair.
 bool Nearer(const cv::Point2f& a, const cv::Point2f& b, double distance_px) {
   return (a - b).ddot(a - b) < distance_px * distance_px;
 }
@@ -119,8 +120,8 @@ std::vector<uchar> Tracker::Klt(const Pyramid& from_pyramid, const Pyramid& to_p
   return ok;
 }
 
-// In the last image's half size alone: what the patch then finds needs no more. An image smaller
-// than KLT's window has no half size.
+// Tracks from the last image in half size only: the reference patch refines the result. An image
+// smaller than KLT's window has no half size.
 std::vector<uchar> Tracker::KltNear(std::vector<cv::Point2f> from,
                                     std::vector<cv::Point2f>* to) const {
   if (std::min(pyramid_.size(), last_pyramid_.size()) < 2 * kNearLevel + 2) {
@@ -141,7 +142,7 @@ std::vector<uchar> Tracker::KltNear(std::vector<cv::Point2f> from,
   return ok;
 }
 
-// Where the camera's rotation takes the features; those it takes out of the image end.
+// Predicts features by the camera's rotation, and removes those that it takes out of the image.
 std::vector<cv::Point2f> Tracker::Rotated(const Eigen::Quaterniond& q_cam_lastcam) {
   std::vector<cv::Point2f> rotated;
   std::erase_if(features_, [&](const Feature& feature) {
@@ -156,7 +157,7 @@ std::vector<cv::Point2f> Tracker::Rotated(const Eigen::Quaterniond& q_cam_lastca
   return rotated;
 }
 
-// Where a feature is found that goes on moving as it did, and looks as it did at first.
+// Finds features that continue their motion and look as they did at first.
 std::vector<Tracker::Found> Tracker::FindAsPredicted(const cv::Mat& image,
                                                      const std::vector<cv::Point2f>& rotated,
                                                      float dt_s) {
@@ -176,7 +177,7 @@ std::vector<Tracker::Found> Tracker::FindAsPredicted(const cv::Mat& image,
   return found;
 }
 
-// The others: anywhere near, forward and back. A patch that does not agree is worth nothing.
+// Searches the others nearby, forward and back, and drops those that their patch does not confirm.
 void Tracker::FindOthers(const cv::Mat& image, const std::vector<cv::Point2f>& rotated,
                          std::vector<Found>* found) {
   std::vector<size_t> which;
@@ -189,7 +190,7 @@ void Tracker::FindOthers(const cv::Mat& image, const std::vector<cv::Point2f>& r
     }
   }
   const std::vector<uchar> forward_ok = Klt(last_pyramid_, pyramid_, from, kKltLevels - 1, &to);
-  // Back from the result with the start as the guess: only the finest levels have work to do.
+  // Tracks back with the start as the guess, so that only the finest levels have work to do.
   std::vector<cv::Point2f> back = from;
   const std::vector<uchar> backward_ok = Klt(pyramid_, last_pyramid_, to, kNearLevel, &back);
   for (size_t k = 0; k < which.size(); ++k) {
@@ -259,7 +260,7 @@ void Tracker::RejectOutliers(const Eigen::Quaterniond& q_cam_lastcam,
   }
   const TwoViewResult check =
       CheckTwoView(rays_before, rays_now, q_cam_lastcam, camera_.PixelAngle(), options_.two_view);
-  // The older of two features that have run together stays.
+  // Of two features that have come too close, the older one stays.
   const double merge_px = kMergeShare * options_.min_distance_px;
   std::vector<Feature> kept;
   for (size_t i = 0; i < features_.size(); ++i) {
@@ -275,8 +276,8 @@ void Tracker::RejectOutliers(const Eigen::Quaterniond& q_cam_lastcam,
   features_ = std::move(kept);
 }
 
-// Shi and Tomasi's: the smaller eigenvalue of the gradients' second moments, summed over a block
-// around each pixel.
+// Shi and Tomasi's response: the smaller eigenvalue of the gradients' second moments, summed over a
+// block around each pixel.
 PANGEA_VECTOR_CLONES
 cv::Mat1f Tracker::CornerResponse(const cv::Rect& cell) const {
   // The derivatives of level 0 are a view into a larger image with a border, so that the blocks see
@@ -284,7 +285,7 @@ cv::Mat1f Tracker::CornerResponse(const cv::Rect& cell) const {
   constexpr int kReach = kCornerBlock_px / 2;
   cv::Mat gradients = pyramid_[1](cell);
   gradients.adjustROI(kReach, kReach, kReach, kReach);
-  // Sums over the last kCornerBlock_px rows, of each column.
+  // Sums over the last kCornerBlock_px rows, for each column.
   std::vector<int> xx(gradients.cols, 0), xy(gradients.cols, 0), yy(gradients.cols, 0);
   const auto add_row = [&](int y, int sign) __attribute__((always_inline)) {
     const auto* gradient = gradients.ptr<int16_t>(y);
@@ -321,7 +322,7 @@ cv::Mat1f Tracker::CornerResponse(const cv::Rect& cell) const {
 
 std::vector<Tracker::RatedCorner> Tracker::FindCorners(const cv::Rect& cell) const {
   const cv::Mat1f response = CornerResponse(cell);
-  // No weaker one will be taken (AddFeatures).
+  // AddFeatures takes no weaker corner.
   const auto least =
       static_cast<float>(std::max(kMinEigenvalue, kQuality * kStrongestKept * strongest_));
   const int inner = response.cols - 2;
@@ -339,7 +340,7 @@ std::vector<Tracker::RatedCorner> Tracker::FindCorners(const cv::Rect& cell) con
       if (r < block_max[x - 1] || r < least) {
         continue;
       }
-      // Of equal ones the last in its row, and the first row.
+      // Of neighbours with equal responses, the first of the first row is taken.
       if (r > row[x - 1] && r > std::max({above[x - 1], above[x], above[x + 1]})) {
         corners.emplace_back(r, cv::Point(cell.x + x, cell.y + y));
       }
@@ -385,7 +386,7 @@ void Tracker::AddFeatures() {
   ++turn_;
   const std::vector<RatedCorner> corners = CornersOfEmptyCells();
   if (!corners.empty()) {
-    // The image's strongest corner, over all recent images: the empty cells alone may be blank.
+    // The strongest corner of all recent images, because the empty cells alone may be blank.
     strongest_ = std::max(kStrongestKept * strongest_, static_cast<double>(corners.front().first));
   }
   for (const auto& [response, at] : corners) {

@@ -28,7 +28,7 @@ struct Outcome {
   double worst_px = 0;
 };
 
-// How well features found in `image` are found again where the rotation takes them.
+// Tracks features of `image` in its rotated view, and compares the results with the true rotation.
 Outcome TrackOnce(const cv::Mat& image, const cv::Mat& rotated, const Eigen::Quaterniond& truth,
                   const Eigen::Quaterniond& guess) {
   const CameraModel camera = PlainCamera();
@@ -99,7 +99,7 @@ TEST(Tracker, SurvivesAChangeOfExposure) {
   EXPECT_LT(outcome.rms_px, 0.25);
 }
 
-// Errors from image to image would add up to several tenths of a pixel over this ride.
+// Errors accumulated from image to image would reach several tenths of a pixel on this ride.
 TEST(Tracker, DoesNotDriftAlongATrack) {
   const cv::Mat image = RandomTexture(752, 480, 9);
   Tracker tracker(PlainCamera(), {});
@@ -132,12 +132,12 @@ TEST(Tracker, DoesNotDriftAlongATrack) {
   EXPECT_LT(errors[errors.size() / 2], 0.1);
 }
 
-// A search that is wrong costs nothing but time: the second search makes up for it.
+// A wrong first search costs only time: the second search corrects it.
 TEST(Tracker, AnEvenMotionIsFoundWhereItLeads) {
   const cv::Mat image = RandomTexture(752, 480, 10);
   Tracker tracker(PlainCamera(), {});
   for (int i = 0; i < 3; ++i) {
-    // Some 6 px an image, of which the gyro knows nothing.
+    // About 6 px per image, which the gyro does not measure.
     const Eigen::Quaterniond q_now_first = ExpSo3(i * Eigen::Vector3d(0.008, 0.012, 0));
     tracker.Track(50'000 * i, RotatedView(image, PlainCamera(), q_now_first),
                   Eigen::Quaterniond::Identity());

@@ -10,11 +10,13 @@
 namespace pangea::vio {
 namespace {
 
-// Hypotheses and the first fits tolerate the gyro's bias: thresholds in multiples of inlier_px.
+// Thresholds in multiples of inlier_px: hypotheses and the first fits must tolerate the gyro's
+// bias.
 constexpr double kHypothesisSlack = 3.0;
 constexpr double kFitSlack[] = {3.0, 1.5, 1.0, 1.0};
 constexpr size_t kMinTracks = 6;
-constexpr int kHypotheses = 60;  // of two tracks: at 40 % outliers one in three is of inliers
+// Each is of two tracks; with 40 % outliers one in three has only inliers
+constexpr int kHypotheses = 60;
 
 struct Tracks {
   std::vector<Eigen::Vector3d> a;  // unit
@@ -28,7 +30,7 @@ double EpipolarError(const Eigen::Vector3d& a_in_b, const Eigen::Vector3d& b,
   return length < 1e-6 ? 0.0 : t.dot(a_in_b.cross(b)) / length;
 }
 
-// Truncated squared error of a direction of translation.
+// Sum of truncated squared errors, for a direction of translation.
 double Score(const std::vector<Eigen::Vector3d>& a_in_b, const std::vector<Eigen::Vector3d>& b,
              const Eigen::Vector3d& t, double threshold) {
   double score = 0;
@@ -42,7 +44,7 @@ double Score(const std::vector<Eigen::Vector3d>& a_in_b, const std::vector<Eigen
 Eigen::Vector3d BestDirection(const std::vector<Eigen::Vector3d>& a_in_b,
                               const std::vector<Eigen::Vector3d>& b, double threshold) {
   std::mt19937_64 random(b.size());
-  // The standard's distributions differ from library to library.
+  // The distributions of the standard library differ between implementations.
   const auto pick = [&] { return static_cast<size_t>(random() % b.size()); };
   Eigen::Vector3d best = Eigen::Vector3d::UnitX();
   double best_score = std::numeric_limits<double>::max();
@@ -63,7 +65,7 @@ Eigen::Vector3d BestDirection(const std::vector<Eigen::Vector3d>& a_in_b,
   return best;
 }
 
-// Cauchy weights at `threshold`, `from_gyro` as prior of the rotation.
+// One step with Cauchy weights at `threshold`; `from_gyro` is the prior of the rotation.
 void FitStep(const Tracks& tracks, double threshold, double rotation_sigma, double noise,
              const Eigen::Quaterniond& from_gyro, Eigen::Quaterniond* q, Eigen::Vector3d* t) {
   EpipolarStep step(*t, 1e-9);
@@ -79,13 +81,13 @@ void FitStep(const Tracks& tracks, double threshold, double rotation_sigma, doub
   const double prior = noise * noise / (rotation_sigma * rotation_sigma);
   step.H.topLeftCorner<3, 3>() += prior * Eigen::Matrix3d::Identity();
   step.g.head<3>() += prior * LogSo3(*q * from_gyro.conjugate());
-  // Where there is no parallax the direction is free: keep it where it is.
+  // Without parallax the direction is undetermined: this keeps it.
   step.H.bottomRightCorner<2, 2>() += Eigen::Matrix2d::Identity() * noise * noise;
   step.Apply(q, t);
 }
 
-// Depth times baseline has the sign of (a x t) . (a x b), up to the sign of t: the side most points
-// are on is the front.
+// Rejects tracks behind the cameras. Depth times baseline has the sign of (a x t) . (a x b), up to
+// the sign of t: the side of most points is the front.
 void RejectBehind(const std::vector<Eigen::Vector3d>& a_in_b, const std::vector<Eigen::Vector3d>& b,
                   const Eigen::Vector3d& t, double threshold, std::vector<bool>* inlier) {
   std::vector<int> side(b.size(), 0);
@@ -93,7 +95,7 @@ void RejectBehind(const std::vector<Eigen::Vector3d>& a_in_b, const std::vector<
   for (size_t i = 0; i < b.size(); ++i) {
     const Eigen::Vector3d parallax = a_in_b[i].cross(b[i]);
     const double length = a_in_b[i].cross(t).norm();
-    // Too little parallax, or too near the epipole, to tell.
+    // Too little parallax, or too near the epipole, to decide.
     if (!(*inlier)[i] || parallax.norm() < 2.0 * threshold || length < 0.1) {
       continue;
     }

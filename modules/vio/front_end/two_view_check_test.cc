@@ -55,7 +55,7 @@ Rates RatesOf(const World& world, const TwoViewResult& result) {
 }
 
 const Eigen::Quaterniond kRotation = ExpSo3({0.02, -0.03, 0.05});
-// The gyro's bias over 50 ms, before anybody knows it.
+// The rotation by the gyro's bias in 50 ms, before the bias is estimated.
 const Eigen::Quaterniond kBias = ExpSo3({0.001, 0.002, -0.004});
 
 TEST(TwoViewCheck, SeparatesOutliersWhenMoving) {
@@ -63,7 +63,7 @@ TEST(TwoViewCheck, SeparatesOutliersWhenMoving) {
   const Rates rates =
       RatesOf(world, CheckTwoView(world.a, world.b, kBias * kRotation, kPixelAngle, {}));
   EXPECT_GT(rates.kept_good, 0.95);
-  // A third of wrong tracks may run along its epipolar line, where two views cannot tell.
+  // A third of the wrong tracks may move along the epipolar line, which two views cannot detect.
   EXPECT_LT(rates.kept_wrong, 0.35);
 }
 
@@ -79,7 +79,7 @@ TEST(TwoViewCheck, KeepsEverythingGoodInPureRotation) {
   const World world = MakeWorld(kRotation, {0, 0, 0}, 0, 3);
   const TwoViewResult result = CheckTwoView(world.a, world.b, kBias * kRotation, kPixelAngle, {});
   EXPECT_GT(RatesOf(world, result).kept_good, 0.97);
-  // The bias is seen: the rotation is the true one, not the gyro's.
+  // The bias is detected: the rotation is the true one, not the gyro's.
   EXPECT_LT(result.q_b_a.angularDistance(kRotation), 3e-4);
 }
 

@@ -27,24 +27,26 @@ namespace {
 using Eigen::MatrixXd;
 
 constexpr double kMaxFrameGap_s = 1.0;
-constexpr int64_t kStartSpan_us = 4'000'000;  // samples a start may ask for
-constexpr double kMaxBlind_s = 5;             // with nothing to go by but inertial samples: lost
-// An image is tracked when this many tracks, and this share of those before, go on in it. In the
-// mere noise of a covered lens a tenth does.
+constexpr int64_t kStartSpan_us = 4'000'000;  // span of samples that a start may need
+constexpr double kMaxBlind_s = 5;             // lost after this time without a trackable image
+// An image counts as tracked if at least this many tracks, and this share of the earlier ones,
+// continue in it. In the noise of a covered lens a tenth do.
 constexpr size_t kMinTracks = 4;
 constexpr double kMinTrackShare = 0.3;
 constexpr double kMaxSpeed = 50;     // m/s
 constexpr double kMaxGyroBias = 1;   // rad/s
 constexpr double kMaxAccelBias = 4;  // m/s^2
 
-// With a rough calibration, what nobody measured bends accelerations slowly, like a bias that
-// moves. A start, which tells tilt from bias by little rotation, would claim far too much; so for a
-// while the accelerometer's random walk counts this many times (docs/decisions/imu.md).
+// With a rough calibration, unmodelled errors change the measured accelerations slowly, like a
+// drifting bias. A start separates tilt from bias by a small rotation only, and would then be far
+// too confident. So for a while after a start the accelerometer's random walk is multiplied by this
+// factor (docs/decisions/imu.md).
 constexpr int64_t kSettling_us = 2'000'000;
 constexpr double kSettlingWalk = 10;
 
 constexpr int kMaxIterations = 4;
-// A start has no solution of the image before: where it knows little, four end half way.
+// A start has no solution of an earlier image: with little information four iterations end half
+// way.
 constexpr int kStartIterations = 20;
 
 double Seconds(int64_t us) { return 1e-6 * static_cast<double>(us); }
@@ -74,9 +76,9 @@ struct Estimator::Impl {
   FrameResult AddFrame(const TrackedFrame& frame, std::span<const ImuSample> imu);
   std::vector<FinishedKeyframe> Flush();
 
-  // Why it has not started with this frame.
+  // Returns the reason if the estimator has not started with this frame.
   std::optional<std::string> TryStart(const TrackedFrame& frame, std::span<const ImuSample> imu);
-  // Why it is lost.
+  // Returns the reason if the estimator is lost.
   std::optional<std::string> Track(const TrackedFrame& frame,
                                    std::vector<int32_t>* outlier_landmarks);
   void TellNewest(FrameResult* result);
@@ -91,7 +93,7 @@ struct Estimator::Impl {
   void ShrinkWindow(std::vector<FinishedKeyframe>* finished);
   void PublishUpTo(int newest, std::vector<FinishedKeyframe>* finished);
   std::optional<std::string> Implausible() const;
-  // Of the newest image.
+  // On the IMU's clock, with the time offset of the newest image.
   int64_t ImuTime(int64_t frame_utime) const {
     return frame_utime + std::llround(1e6 * problem.state.OffsetAt(excess_interval_s));
   }
@@ -108,7 +110,7 @@ struct Estimator::Impl {
   CameraModel camera;
   ImuNoise noise;
   double ray_sigma;
-  bool is_rough;  // the calibration
+  bool is_rough;  // whether the calibration is rough
   Initialiser initialiser;
   bool started = false;
   int64_t settled_imu_utime = std::numeric_limits<int64_t>::max();
@@ -121,15 +123,15 @@ struct Estimator::Impl {
   double excess_interval_s = 0;  // of the newest image
   FrameChoice choice;
   KeyframePublisher publisher;
-  int64_t last_tracked = 0;  // utime of the newest image that is one
+  int64_t last_tracked = 0;  // utime of the newest tracked image
   bool lost = false;
 };
 
-// The window takes over the frames the start was found from: they go on being refined. All of them,
-// and what is too much is marginalised: of somebody who rotates on the spot hardly two are apart
-// enough to be worth a place, and those two know neither speed nor tilt.
+// The window takes over the frames from which the start was found, and goes on refining them. It
+// takes all of them, and marginalises the surplus: if the camera rotates on the spot, hardly two
+// are far enough apart to be window keyframes, and these two determine neither speed nor tilt.
 void Estimator::Impl::Start(const InitialState& initial) {
-  const int64_t offset_us = ImuTime(0);  // as it was when the initialiser got the frames
+  const int64_t offset_us = ImuTime(0);  // the offset with which the initialiser got the frames
   problem.state.time_offset_s += initial.time_offset_change_s;
   for (const InitialState::Frame& from : initial.frames) {
     TrackedFrame tracked = from.tracked;
@@ -184,8 +186,8 @@ void Estimator::Impl::Append(int64_t utime, const ImuState& imu, std::optional<I
   problem.imu_factors.push_back(std::move(factor));
 }
 
-// A frame that is no window keyframe makes room for the next one: its rays go, its inertial samples
-// are measured again as part of the longer span.
+// A frame that is not a window keyframe makes room for the next one: its rays are dropped, and its
+// inertial samples are integrated again as a part of the longer span.
 void Estimator::Impl::DropNonKeyframe() {
   if (!Newest().is_window_keyframe) {
     history.RemoveFrame(Newest().utime);
@@ -194,7 +196,7 @@ void Estimator::Impl::DropNonKeyframe() {
   }
 }
 
-// Nothing when it worked, else what is wrong.
+// Returns the reason of a failure, nothing on success.
 std::optional<std::string> Estimator::Impl::AddToWindow(const TrackedFrame& frame) {
   const int64_t imu_utime = ImuTime(frame.utime);
   if (auto wrong = imu_samples.Gap(Newest().imu_utime, imu_utime)) {
@@ -222,7 +224,7 @@ bool Estimator::Impl::TracksGoOn(int64_t from_utime, int64_t to_utime) const {
   return go_on >= kMinTracks && static_cast<double>(go_on) >= kMinTrackShare * all;
 }
 
-// Optimises the window; the tracks that turned out to be outliers.
+// Optimises the window; returns the outliers among the newest image's tracks.
 std::vector<int32_t> Estimator::Impl::Solve(int max_iterations) {
   problem.landmarks = landmarks.Gather(problem.state, history);
   Optimise(problem, max_iterations);
@@ -248,10 +250,11 @@ std::vector<int32_t> Estimator::Impl::Solve(int max_iterations) {
   return outliers;
 }
 
-// Publishes the keyframes up to frame `newest` that have not been.
+// Publishes the keyframes up to frame `newest` that are not yet published.
 void Estimator::Impl::PublishUpTo(int newest, std::vector<FinishedKeyframe>* finished) {
   std::vector<int> due;
-  std::vector<int> rows = RowsOfPoses(problem.state);  // of the covariance that they need
+  // Rows of the covariance that publishing needs
+  std::vector<int> rows = RowsOfPoses(problem.state);
   for (int i = 0; i <= newest; ++i) {
     const WindowFrame& frame = problem.state.frames[i];
     if (frame.is_keyframe && !frame.is_published) {
@@ -271,7 +274,7 @@ void Estimator::Impl::PublishUpTo(int newest, std::vector<FinishedKeyframe>* fin
 
 void Estimator::Impl::ShrinkWindow(std::vector<FinishedKeyframe>* finished) {
   WindowState& state = problem.state;
-  int due = -1;  // keyframes up to here have waited long enough
+  int due = -1;  // keyframes up to this frame have waited long enough
   for (int i = 0; i <= state.Newest(); ++i) {
     due = Seconds(Newest().utime - state.frames[i].utime) > kKeyframeInterval_s ? i : due;
   }
@@ -295,8 +298,8 @@ void Estimator::Impl::ShrinkWindow(std::vector<FinishedKeyframe>* finished) {
   imu_samples.Forget(std::min(state.frames.front().imu_utime, ImuTime(state.frames[published])));
 }
 
-// The landmarks anchored in a frame that goes tell the prior what they know, and start anew; those
-// that do not fit go without a word.
+// Before `frame` is marginalised: the landmarks anchored in it will add their information to the
+// prior, and start anew. Those that do not fit are removed, so they add nothing.
 void Estimator::Impl::MarginaliseLandmarks(int frame) {
   RowViews rows(problem.state);
   std::erase_if(problem.landmarks, [&](const Landmark& landmark) {
@@ -417,7 +420,7 @@ FrameResult Estimator::AddFrame(const TrackedFrame& frame, std::span<const ImuSa
 
 std::vector<FinishedKeyframe> Estimator::Flush() { return impl_->Flush(); }
 
-// Its time offset is that of the newest image.
+// The returned time offset is that of the newest image.
 CameraModel Estimator::camera() const {
   const WindowState& state = impl_->problem.state;
   CameraModel camera = state.Calibrated(impl_->camera);

@@ -10,10 +10,10 @@
 namespace pangea::vio {
 namespace {
 
-constexpr size_t kIntervals = 5;  // a median that two odd ones do not move
-// Sigmas: of 100,000 such medians the largest and the smallest are 5.8 of the jitter apart.
+constexpr size_t kIntervals = 5;  // two unusual intervals do not change their median
+// In sigmas of the jitter: the largest and the smallest of 100,000 such medians differ by 5.8.
 constexpr double kJitters = 6;
-constexpr double kRounding_s = 1e-3;  // stamps in milliseconds
+constexpr double kRounding_s = 1e-3;  // rounding of stamps to milliseconds
 
 }  // namespace
 
@@ -43,7 +43,8 @@ double ImageStamps::sigma_s() const {
     return jitter_s;
   }
   const bool exposure_makes_it = !exposure_is_known_ && longest_s_ - shortest_s_ > kRounding_s;
-  return exposure_makes_it ? 0.5 * interval_s() / std::sqrt(12.0) : 0;  // uniformly distributed
+  // Sigma of a uniform distribution
+  return exposure_makes_it ? 0.5 * interval_s() / std::sqrt(12.0) : 0;
 }
 
 double ImageStamps::interval_s() const {

@@ -19,8 +19,8 @@ double ChiSquare95(int degrees_of_freedom) {
 }
 
 struct LandmarkError {
-  double sum = 0;    // of squares, sigmas
-  double worst = 0;  // ray, sigmas
+  double sum = 0;    // of squared errors, in sigmas^2
+  double worst = 0;  // largest error of a ray, in sigmas
 };
 LandmarkError ErrorOf(RowViews& rows, const Landmark& landmark) {
   LandmarkError error;

@@ -17,44 +17,45 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 constexpr int kC = kCalibrationSize;
-// A ray this many sigmas off is pulled at with constant force.
+// In sigmas: a ray with a larger error pulls with constant force.
 constexpr double kHuber = 2.0;
-// What a point behind a camera that saw it costs, as a ray this many sigmas off: nothing is gained
-// by throwing it there.
+// A point behind a camera that saw it costs as much as a ray with an error of this many sigmas, so
+// that moving the point there gains nothing.
 constexpr double kBehind = 100;
 
 double HuberCost(double e) { return e <= kHuber ? 0.5 * e * e : kHuber * (e - 0.5 * kHuber); }
 double HuberWeight(double e) { return e <= kHuber ? 1.0 : kHuber / e; }
 
-// Where the errors of a frame's pose and of its stamp are among the window's.
+// Rows of a frame's pose errors and of its stamp's error in the window's error vector.
 struct FrameColumns {
   int pose = 0;
-  int stamp = -1;  // none
+  int stamp = -1;  // -1: no stamp error
 };
 FrameColumns ColumnsOf(const WindowState& state, int frame) {
   const int pose = state.Offset(frame);
   return {pose, state.frames[frame].has_stamp_error() ? pose + kStampError : -1};
 }
 
-// One ray's derivatives, whitened, weighted and transposed: products of them then are of whole
-// columns. kRay rows of a frame: its pose, and perhaps its stamp.
+// One ray's derivatives: whitened, weighted and transposed, so that their products work on whole
+// columns. kRay: number of errors of a frame, which are those of its pose and perhaps of its stamp.
 template <int kRay>
 struct RayTerms {
-  size_t ray = 0;  // index of the landmark's
+  size_t ray = 0;  // index within the landmark's rays
   Vector2d r;
   Matrix<double, kC, 2> Jt_calibration;
   Matrix<double, kRay, 2> Jt_anchor, Jt_frame;
 };
 
-// A landmark before it is eliminated. Rows of W: as the columns of NormalEquations::Elimination.
+// A landmark before it is eliminated. Rows of W are ordered like the columns of
+// NormalEquations::Elimination.
 template <int kRay>
 struct LandmarkTerms {
   double cost = 0;
-  size_t anchor = 0;                 // index of its ray
-  std::vector<RayTerms<kRay>> rays;  // those in front of their camera
-  Matrix3d V = Matrix3d::Zero();     // of the point
+  size_t anchor = 0;                 // index of the anchor frame's ray
+  std::vector<RayTerms<kRay>> rays;  // those with the point in front of the camera
+  Matrix3d V = Matrix3d::Zero();     // information of the point
   Vector3d g_point = Vector3d::Zero();
-  Matrix<double, Eigen::Dynamic, 3> W;  // the rest by the point
+  Matrix<double, Eigen::Dynamic, 3> W;  // cross terms: the other variables (rows) by the point
 
   static int Row(size_t ray) { return kC + kRay * static_cast<int>(ray); }
 };
@@ -87,7 +88,7 @@ LandmarkTerms<kRay> LineariseLandmark(RowViews& rows, const Landmark& landmark) 
     const FrameRay& seen = landmark.rays[j];
     const auto predicted = PredictRay(rows, point, seen);
     if (!predicted) {
-      out.cost += HuberCost(kBehind);  // and no derivative: it says nothing of where to go
+      out.cost += HuberCost(kBehind);  // no derivative, as none would tell where to move the point
       continue;
     }
     const Vector2d r = (predicted->ray - seen.ray) / seen.sigma;
@@ -103,7 +104,7 @@ LandmarkTerms<kRay> LineariseLandmark(RowViews& rows, const Landmark& landmark) 
     out.g_point += J_point.transpose() * terms.r;
     out.W.template topRows<kC>() += terms.Jt_calibration * J_point;
     if (j == out.anchor) {
-      continue;  // in its own anchor a point is where its ray is, wherever the frames are
+      continue;  // in its anchor frame the ray of a point does not depend on any pose
     }
     terms.Jt_anchor =
         scale * FrameJacobian<kRay>(predicted->J_anchor, predicted->J_anchor_stamp, anchor_frame);
@@ -128,7 +129,8 @@ NormalEquations::Elimination Eliminate(const LandmarkTerms<kRay>& terms, double 
   return elimination;
 }
 
-// Adds a frame's part of the gradient, of the calibration's rows in H, and of two frames' block.
+// The next functions add a frame's part of the gradient and of the calibration's rows of H, and the
+// block of two frames.
 template <int kRay>
 void AddGradient(const FrameColumns& at, const Matrix<double, kRay, 1>& part, VectorXd* g) {
   g->segment<kPoseSize>(at.pose) += part.template head<kPoseSize>();
@@ -167,12 +169,12 @@ void AddBlock(const FrameColumns& i, const FrameColumns& j, const Matrix<double,
   }
 }
 
-// What the rays say with the point held fast.
+// Adds the rays' information, with the point fixed.
 template <int kRay>
 void AddRays(const LandmarkTerms<kRay>& terms, const std::vector<FrameColumns>& columns,
              NormalEquations* out) {
   const FrameColumns& anchor = columns[terms.anchor];
-  // Of the blocks that all rays share.
+  // Sums for the blocks that all rays share: calibration (c) and anchor (a).
   Matrix<double, kC, kC> H_cc = Matrix<double, kC, kC>::Zero();
   Matrix<double, kC, kRay> H_ca = Matrix<double, kC, kRay>::Zero();
   Matrix<double, kRay, kRay> H_aa = Matrix<double, kRay, kRay>::Zero();
@@ -200,7 +202,7 @@ void AddRays(const LandmarkTerms<kRay>& terms, const std::vector<FrameColumns>& 
   AddBlock<kRay>(anchor, anchor, H_aa, &out->H);
 }
 
-// What it costs them that the point is not: the Schur complement.
+// Subtracts the information that is lost because the point is unknown: the Schur complement.
 template <int kRay>
 void AddElimination(const LandmarkTerms<kRay>& terms,
                     const NormalEquations::Elimination& elimination,

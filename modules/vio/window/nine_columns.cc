@@ -10,7 +10,7 @@ namespace {
 
 constexpr int kColumns = 9;
 
-// to -= A weights, rows `begin` to `end`.
+// to -= A * weights, for the rows `begin` to `end`.
 [[gnu::always_inline]] inline void SubtractWeighted(const NineColumns& A,
                                                     const std::array<double, kColumns>& weights,
                                                     Eigen::Index begin, Eigen::Index end,

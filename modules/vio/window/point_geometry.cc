@@ -14,9 +14,8 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr double kMinDepth = 0.1;  // metres, in any camera that sees the point
-constexpr double kMaxDepth = 200;  // beyond it a phone's baseline says nothing
-// The inverse depth must be known to this share of itself or to this much absolutely (then the
-// point is "far").
+constexpr double kMaxDepth = 200;  // metres; farther points get no depth from a phone's baseline
+// Largest sigma of the inverse depth: relative to itself, or absolute (then the point is "far").
 constexpr double kMaxRelativeSigma = 0.5;
 constexpr double kMaxInverseDepthSigma = 0.02;
 
@@ -43,7 +42,7 @@ Rigid3 CameraPose(const WindowState& state, const FrameRay& seen) {
   return BodyPose(state, seen) * state.T_body_cam;
 }
 
-// In odom.
+// Lines of sight in the odom frame.
 std::vector<LineOfSight> LinesOfSight(const WindowState& state, std::span<const FrameRay> rays,
                                       const std::vector<Rigid3>& T_odom_cam) {
   std::vector<LineOfSight> lines;
@@ -55,14 +54,14 @@ std::vector<LineOfSight> LinesOfSight(const WindowState& state, std::span<const 
   return lines;
 }
 
-// Of one Gauss-Newton step of a point (alpha, beta, rho) seen along `rays`.
+// Normal equations of a Gauss-Newton step for a point (alpha, beta, rho) seen along `rays`.
 struct PointNormalEquations {
   Matrix3d A = Matrix3d::Zero();
   Vector3d b = Vector3d::Zero();
   double cost = 0;
 };
 
-// Nothing when a camera has the point behind it.
+// Returns nothing if the point is behind a camera.
 std::optional<PointNormalEquations> PointEquations(const WindowState& state,
                                                    std::span<const FrameRay> rays,
                                                    const std::vector<Rigid3>& T_odom_cam,
@@ -163,7 +162,7 @@ std::optional<PredictedRay> PredictRay(RowViews& rows, const PointInOdom& point,
   if (!(y.z() > kMinDepth)) {
     return std::nullopt;
   }
-  // d(ray) by a shift of the point in the body's axes and in odom's.
+  // Derivatives of the ray with respect to a shift of the point, in the axes of body and of odom.
   const Eigen::Matrix<double, 2, 3> J_body =
       (1 + state.intrinsics.x()) * RayJacobian(y) * R_cam_body;
   const Eigen::Matrix<double, 2, 3> J_odom = J_body * R_body_odom;

@@ -9,17 +9,18 @@
 namespace pangea::vio {
 namespace {
 
-constexpr size_t kStamps = 60;    // two seconds or three
-constexpr size_t kMinStamps = 8;  // fewer say little
+constexpr size_t kStamps = 60;    // two or three seconds of images
+constexpr size_t kMinStamps = 8;  // fewer are too few for an estimate
 constexpr double kMadToSigma = 1.4826;
-// 0.1 ms moves a phone's image by a twentieth of a pixel at most.
+// Less is negligible: at 500 pixels/s, 0.2 ms moves a feature by a tenth of a pixel.
 constexpr double kMinSigma_s = 2e-4;
 constexpr double kMaxSigma_s = 0.02;
 
 }  // namespace
 
-// Of evenly spaced times the second differences vanish; of jitter sigma they have 6 sigma^2. The
-// median of their magnitudes does not see the few where the rate changes or an image is missing.
+// For evenly spaced times the second differences vanish; with jitter sigma their variance is 6
+// sigma^2. The median of their magnitudes is not affected by a few changes of rate or missing
+// images.
 void StampJitter::AddFrame(int64_t utime) {
   utimes_.push_back(utime);
   if (utimes_.size() > kStamps) {

@@ -5,13 +5,13 @@
 namespace pangea::vio {
 namespace {
 
-// Of 15 degrees of freedom; noise alone comes here once in 10^14 factors.
+// Chi-squared with 15 degrees of freedom; noise alone exceeds this once in 10^14 factors.
 constexpr double kContradiction = 100;
 constexpr double kFarSigmas = 5;
-constexpr double kAccelSigma = 2;  // m/s^2: a lift has 1, a car that brakes 5
+constexpr double kAccelSigma = 2;  // m/s^2: a lift accelerates with 1, a braking car with 5
 
-// Of a stationary frame the images say that its velocity is zero; where the estimate is far from
-// that, it is what the IMU made of it.
+// The images show that a stationary frame has velocity zero. If the estimated velocity is far from
+// zero, it comes from the IMU and is replaced by zero.
 ImuState AsTheImagesHaveIt(const WindowFrame& frame) {
   ImuState state = frame.imu;
   if (frame.stationary && state.v_odom_body.norm() > kFarSigmas * kStationaryVelocitySigma) {

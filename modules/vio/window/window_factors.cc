@@ -14,7 +14,7 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-// Stationary: what may pass for it within the noise of a hundred tracks together.
+// Sigmas of a stationary frame: motion that the noise of a hundred tracks together can hide.
 constexpr double kStationaryPositionSigma = 0.002;   // m, between two stationary frames
 constexpr double kStationaryRotationSigma = 0.0003;  // rad
 
@@ -34,11 +34,11 @@ Vector6d ZeroMotionResidual(const WindowState& state, int to) {
 
 }  // namespace
 
-// Rows of Jt: IMU intrinsics; frame i; pose and velocity of frame j: in the order of the window, as
-// only the upper triangle is asked for. The biases' own residuals, whose information is diagonal,
-// are added apart.
+// Rows of Jt: IMU intrinsics; frame i; pose and velocity of frame j. This is the window's order, as
+// only the upper triangle of H is filled. The residuals of the biases' random walks, whose
+// information is diagonal, are added separately.
 void AddImuFactor(const WindowState& state, const ImuFactor& factor, int to, NormalEquations* out) {
-  constexpr int kMotion = 9;  // residuals; and errors of j
+  constexpr int kMotion = 9;  // number of residuals, and of errors of frame j
   constexpr int kErrors = kImuIntrinsicsSize + kFrameSize + kMotion;
   const ImuState& from = state.frames[to - 1].imu;
   const InertialResidual residual =
@@ -83,8 +83,8 @@ void AddImuFactor(const WindowState& state, const ImuFactor& factor, int to, Nor
 }
 
 void AddZeroVelocityUpdate(const WindowState& state, int frame, NormalEquations* out) {
-  // r = R^T v, so that a rotation of all the frames leaves it as it is also when v is not yet zero;
-  // its derivative by xi_v is R^T.
+  // r = R^T v does not change if all frames are rotated, even while v is not zero; its derivative
+  // with respect to xi_v is R^T.
   const Vector3d& v = state.frames[frame].imu.v_odom_body;
   const double information = 1 / (kStationaryVelocitySigma * kStationaryVelocitySigma);
   const int at = state.Offset(frame) + kVelocity;
@@ -137,8 +137,8 @@ void AddPrior(const WindowProblem& problem, NormalEquations* out) {
   const WindowPrior& prior = problem.prior;
   const VectorXd e = PriorError(problem);
   const VectorXd He = prior.H * e;
-  // The prior's derivatives stay those of its own linearisation: the unobservable directions are
-  // the same here and there.
+  // The prior keeps the derivatives of its own linearisation point: there and at the present state
+  // the unobservable directions are the same.
   out->H.topLeftCorner(prior.H.rows(), prior.H.cols()) += prior.H;
   out->g.head(prior.g.size()) += prior.g + He;
   out->cost += prior.g.dot(e) + 0.5 * e.dot(He);

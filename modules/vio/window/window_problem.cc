@@ -17,8 +17,8 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 constexpr double kMinInverseDepth = 1e-4;  // 1/m
-// An iteration that promises less than this of the cost (a half is one sigma of one direction) is
-// the last.
+// The last iteration is the one with a predicted decrease of the cost below this (a decrease of 0.5
+// is one sigma along one direction).
 constexpr double kEnough = 0.02;
 constexpr int kMaxRetries = 6;
 
@@ -43,10 +43,10 @@ void Step(const NormalEquations& equations, const VectorXd& step, WindowProblem*
   state.Retract(step);
 }
 
-// Landmarks fill the upper triangle only.
+// Landmarks fill only the upper triangle.
 void MirrorUpper(MatrixXd* H) { H->triangularView<Eigen::StrictlyLower>() = H->transpose(); }
 
-// All that is said of the oldest full frame.
+// Linearises all factors of the oldest full frame, with the landmarks anchored in it.
 NormalEquations LineariseOldest(const WindowProblem& problem, int oldest) {
   const WindowState& state = problem.state;
   NormalEquations out;

@@ -19,8 +19,8 @@ static_assert(kMotionSize == NineColumns::ColsAtCompileTime);
 struct MotionColumns {
   int at = 0;  // first row in the window
   Eigen::LLT<Matrix9d> own;
-  Matrix9d next = Matrix9d::Zero();  // the next older frame's rows
-  NineColumns of_rest;               // as many rows of it as are met
+  Matrix9d next = Matrix9d::Zero();  // rows of the next older frame
+  NineColumns of_rest;               // rows of the pose and shared part, as far as they are filled
 };
 
 struct CholeskyFactor {
@@ -29,12 +29,13 @@ struct CholeskyFactor {
   MatrixXd of_rest;  // the lower triangle
 };
 
-// Nothing when H is not positive definite.
+// Returns nothing if H is not positive definite.
 std::optional<CholeskyFactor> Factorise(const WindowState& state, const MatrixXd& H) {
   CholeskyFactor factor;
   factor.rest = RowsOfPoses(state);
   factor.of_rest = H(factor.rest, factor.rest);
-  int met = kSharedSize + state.frames.back().size() - kMotionSize;  // rows of the rest
+  // Number of filled rows of the rest
+  int met = kSharedSize + state.frames.back().size() - kMotionSize;
   const MotionColumns* last = nullptr;
   factor.motions.reserve(state.frames.size());
   for (int i = state.Newest(); i >= 0 && !state.frames[i].pose_only; --i) {

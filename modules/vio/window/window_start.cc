@@ -10,22 +10,22 @@ using Eigen::Vector3d;
 using Matrix15d = Eigen::Matrix<double, 15, 15>;
 
 constexpr double kRoughDistortion = 0.001;
-constexpr double kIntervalShareSigma = 0.3;  // between stamps of the begin and of the end, +-1/2
-constexpr double kExactScale = 1e-5;  // what an exact IMU's scale factors and axes may still be off
+constexpr double kIntervalShareSigma = 0.3;  // a stamp of the exposure's start or end is +-1/2
+constexpr double kExactScale = 1e-5;  // remaining sigma of an exact IMU's scale factors and axes
 
-// Of a moving start: next to nothing on tilt and velocity.
+// Prior of a moving start: almost no information on tilt and velocity.
 constexpr double kTiltSigma = 0.5;       // rad
 constexpr double kVelocitySigma = 5;     // m/s
-constexpr double kGyroBiasSigma = 0.05;  // rad/s, about what was found
+constexpr double kGyroBiasSigma = 0.05;  // rad/s, about the bias that was found
 
-// As CalibrationSigmas::distortion has it.
+// The rule is that of CalibrationSigmas::distortion.
 double DistortionSigma(const CameraModel& camera, const CalibrationSigmas& given) {
   constexpr double kMeasured = 0.0003, kNotMeasured = 0.1;
   return given.distortion > 0 ? given.distortion
                               : (camera.distortion.isZero() ? kNotMeasured : kMeasured);
 }
 
-// Each sensor has gains and axes of its own, the gyro's are the body's.
+// Each sensor has its own gains and axes; the gyro's axes define the body's.
 Eigen::Matrix<double, kImuIntrinsicsSize, kImuIntrinsicsSize> ImuIntrinsicsCovariance(
     const ImuNoise& noise) {
   ImuIntrinsics sigma;
@@ -45,7 +45,7 @@ Eigen::Matrix<double, kImuIntrinsicsSize, kImuIntrinsicsSize> ImuIntrinsicsCovar
   return P;
 }
 
-// From (dtheta, dp, dv) to right-invariant errors: xi = d - dtheta x value.
+// Converts a covariance of (dtheta, dp, dv) to right-invariant errors: xi = d - dtheta x value.
 Matrix15d ToInvariant(const ImuState& imu, const Matrix15d& covariance) {
   Matrix15d J = Matrix15d::Identity();
   J.block<3, 3>(kPosition, kTheta) = Hat(imu.T_odom_body.t);
@@ -73,12 +73,12 @@ WindowPrior StartPrior(const WindowState& start, const Matrix15d& covariance,
   P.block<kImuIntrinsicsSize, kImuIntrinsicsSize>(kImuIntrinsics, kImuIntrinsics) =
       ImuIntrinsicsCovariance(noise);
   P.bottomRightCorner<kFrameSize, kFrameSize>() = ToInvariant(start.frames[0].imu, covariance);
-  // The start's origin and yaw are chosen, so known: 0.1 mm and 0.1 mrad keep the matrix
-  // invertible.
+  // Origin and yaw of the start are chosen and so exactly known; sigmas of 0.1 mm and 0.1 mrad keep
+  // the matrix invertible.
   P.diagonal().segment<kPoseSize>(kSharedSize).array() += 1e-8;
   WindowPrior prior;
   prior.at = start;
-  prior.H.setZero(start.size(), start.size());  // it says nothing of the stamp's error
+  prior.H.setZero(start.size(), start.size());  // no information on the stamp's error
   prior.H.topLeftCorner(n, n) = P.llt().solve(MatrixXd::Identity(n, n));
   prior.g.setZero(start.size());
   return prior;

@@ -1,4 +1,4 @@
-// Whether finished keyframes are as good as their covariance says.
+// Tests whether the covariances of finished keyframes fit their errors.
 
 #include <gtest/gtest.h>
 
@@ -14,7 +14,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-// The truth at the finished keyframes, in the estimate's odom: that of the first one's yaw, origin.
+// The truth at the finished keyframes, in an odom frame with yaw and origin of the first one's
+// estimate.
 std::vector<ImuState> TruthOf(const Ride& ride) {
   const FinishedKeyframe& first = ride.finished.front();
   const Rigid3 T_first = ride.world.TruthAt(first.utime).T_odom_body;
@@ -30,7 +31,7 @@ std::vector<ImuState> TruthOf(const Ride& ride) {
   return truths;
 }
 
-// In the window's coordinates (window_state.h).
+// In the window's error coordinates (window_state.h).
 Eigen::Matrix<double, 15, 1> ErrorOf(const FinishedKeyframe& keyframe, const ImuState& truth) {
   const Eigen::Quaterniond rotation = truth.T_odom_body.q * keyframe.T_odom_body.q.conjugate();
   Eigen::Matrix<double, 15, 1> e;
@@ -44,7 +45,8 @@ Vector6d EdgeErrorOf(const FinishedKeyframe& keyframe, const ImuState& from, con
   return (from.T_odom_body.Inverse() * to.T_odom_body).Minus(keyframe.edge->T_previous_this);
 }
 
-// Of the position itself, p - p^ = xi_p + theta x p^, not of what is left of it after the rotation.
+// The error of the position itself, p - p^ = xi_p + theta x p^; xi_p is only its part without the
+// rotation's error.
 struct PositionError {
   Eigen::Vector3d error;
   Eigen::Matrix3d covariance;
@@ -56,8 +58,9 @@ PositionError PositionErrorOf(const FinishedKeyframe& keyframe, const ImuState& 
           J * keyframe.covariance.topLeftCorner<6, 6>() * J.transpose()};
 }
 
-// What is known of a shift along odom's axes and of a rotation about its z axis. Not the variances
-// of position and yaw: the start's position depends on velocity and tilt, of which more is learnt.
+// Information on a shift along odom's axes and on a rotation about its z axis. Variances of
+// position and yaw would not do: the start's position depends on velocity and tilt, on which
+// information is gained.
 Eigen::Matrix4d UnobservableInformation(const Eigen::Matrix<double, 15, 15>& covariance) {
   Eigen::Matrix<double, 15, 4> N = Eigen::Matrix<double, 15, 4>::Zero();
   N.block<3, 3>(kPosition, 0).setIdentity();
@@ -65,7 +68,7 @@ Eigen::Matrix4d UnobservableInformation(const Eigen::Matrix<double, 15, 15>& cov
   return N.transpose() * covariance.llt().solve(N);
 }
 
-// The last keyframe of each ride: the rides are independent, the keyframes of one are not.
+// Uses the last keyframe of each ride: rides are independent, keyframes of one ride are not.
 TEST(EstimatorConsistency, KeyframesAreAsGoodAsTheirCovarianceSays) {
   NeesOfRides position, yaw, tilt, velocity, gyro_bias, accel_bias, edges;
   for (const Ride& ride : ShortRides(40, {})) {
@@ -92,7 +95,8 @@ TEST(EstimatorConsistency, KeyframesAreAsGoodAsTheirCovarianceSays) {
   edges.ExpectHonest("edges");
 }
 
-// Position and yaw cannot be observed: nobody ever knows more of them than the start did.
+// Position and yaw are not observable: no keyframe may have more information on them than the
+// start.
 TEST(EstimatorConsistency, PositionAndYawAreNeverBetterKnownThanAtTheStart) {
   for (const Ride& ride : TenRides()) {
     const uint64_t seed = ride.world.options().seed;
@@ -108,7 +112,8 @@ TEST(EstimatorConsistency, PositionAndYawAreNeverBetterKnownThanAtTheStart) {
   }
 }
 
-// Believed to be exact, these IMUs have the accelerometer's bias at 5, tilt and edges at 2.7.
+// Without the states of the intrinsics, NEES / dimension is 5 for the accelerometer's bias, and 2.7
+// for tilt and edges.
 TEST(EstimatorConsistency, AnImuWithWrongIntrinsicsIsBelievedNoMore) {
   NeesOfRides tilt, velocity, accel_bias, edges;
   VioTestWorldOptions options;
@@ -130,8 +135,7 @@ TEST(EstimatorConsistency, AnImuWithWrongIntrinsicsIsBelievedNoMore) {
   edges.ExpectHonest("edges with a wrong IMU");
 }
 
-// A phone's rolling shutter in a hand that shakes: its rotation rate changes while the rows are
-// read out.
+// A phone with a rolling shutter in a shaking hand: its rotation rate changes during the read-out.
 TEST(EstimatorConsistency, RowsThatAccelerateAreBelievedNoMore) {
   VioTestWorldOptions options;
   options.readout_s = 0.03;
@@ -152,8 +156,7 @@ TEST(EstimatorConsistency, RowsThatAccelerateAreBelievedNoMore) {
   edges.ExpectHonest("edges with rows that accelerate");
 }
 
-// A phone of which nobody measured anything: an unknown lens, and an IMU that is six times as wrong
-// as it is said to be.
+// An uncalibrated phone: an unknown lens, and an IMU whose errors are six times as large as stated.
 TEST(EstimatorConsistency, AStartWithARoughCalibrationIsBelievedNoMore) {
   VioTestWorldOptions options;
   options.imu_noise = ImuNoise{};

@@ -1,4 +1,4 @@
-// How far the pose goes along with a crowd or a bus that fills a part of the view.
+// Tests how far a crowd or a bus that fills a part of the view moves the estimated pose along.
 
 #include <gtest/gtest.h>
 
@@ -26,8 +26,8 @@ VioTestWorldOptions CrowdOptions(double share, bool stands, bool sets_off, uint6
   return options;
 }
 
-// Metres off, a second after the crowd has gone, of the motion since it came; the crowd went 2.5 m
-// or 3 m meanwhile.
+// Error in metres of the motion from a second before the crowd comes to a second after it has gone;
+// the crowd moves by 2.5 m or 3 m meanwhile.
 double OffAfterCrowd(const VioTestWorldOptions& options) {
   Ride ride(options);
   ride.Advance(static_cast<int>((kComes_s - 1) * options.frame_rate_hz));
@@ -41,8 +41,8 @@ double OffAfterCrowd(const VioTestWorldOptions& options) {
   return (went - truth).norm();
 }
 
-// One that stood in view and sets off takes a walking camera's pose along when it has more than
-// half of the tracks (docs/maths_vio.md): of those only the smaller is here.
+// A crowd that stood in view and sets off moves the pose of a walking camera if it has more than
+// half of the tracks (docs/maths_vio.md). So a walking camera is tested with a smaller crowd only.
 TEST(Estimator, ACrowdDoesNotTakeThePoseAlong) {
   for (const double share : {0.4, 0.6, 0.8}) {
     EXPECT_LT(OffAfterCrowd(CrowdOptions(share, true, true, 1)), 0.25) << share;

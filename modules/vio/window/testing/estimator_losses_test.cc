@@ -1,4 +1,5 @@
-// How the estimator goes on, or says that it is lost, when images or inertial samples fail.
+// Tests that the estimator continues, or says that it is lost, when images or inertial samples
+// fail.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -15,8 +16,8 @@ namespace {
 using Eigen::Vector3d;
 using ::testing::HasSubstr;
 
-// What a tracker finds in the noise of a covered lens, guided by the gyro: new features all over,
-// of which a tenth goes on by chance; and one that goes on for long, far away but creeping.
+// Simulates a tracker with gyro prediction in the noise of a covered lens: new features everywhere,
+// of which a tenth continues by chance, and one far feature that continues for long and creeps.
 class CoveredLens {
  public:
   explicit CoveredLens(Ride* ride) : ride_(*ride) {}
@@ -57,7 +58,7 @@ class CoveredLens {
   int32_t next_id_ = kCreeping + 1;
 };
 
-// The noise says nothing: the pose is that of a camera that sees nothing at all.
+// Noise contains no information: the pose must be that of a camera without any features.
 TEST(Estimator, ACoveredLensIsBridged) {
   for (uint64_t seed = 1; seed <= 3; ++seed) {
     VioTestWorldOptions options;
@@ -90,13 +91,13 @@ TEST(Estimator, ALensCoveredForLongIsALoss) {
     lens.Advance();
     keyframes += ride.last.is_keyframe ? 1 : 0;
   }
-  EXPECT_LE(keyframes, 1);     // nobody can do anything with a picture of noise
+  EXPECT_LE(keyframes, 1);     // an image of noise is of no use as a keyframe
   EXPECT_NEAR(images, 51, 2);  // 5 s
   EXPECT_THAT(ride.last.reason, HasSubstr("nothing trackable"));
 }
 
-// The cabin stands still in the images, the samples feel how it starts and stops. Without the
-// allowance for it the pose is 0.4 m to 15 m off.
+// In the images the cabin stands still, but the samples measure how it starts and stops. Without
+// the allowance for unmodelled acceleration the pose is 0.4 m to 15 m off.
 TEST(Estimator, InALiftThePoseIsThatInTheCabin) {
   for (const bool stands : {true, false}) {
     for (uint64_t seed = 1; seed <= 2; ++seed) {
@@ -126,7 +127,7 @@ TEST(Estimator, InALiftThePoseIsThatInTheCabin) {
         ASSERT_LT((T.t - ride.last.T_odom_body.t).norm(), i < 139 ? 0.5 : 0.2) << "at " << t;
       }
       EXPECT_GT(contradicted, 0);
-      // Such samples are no measurement for the server either.
+      // These samples must not be a measurement for the server either.
       ride.Flush();
       EXPECT_TRUE(std::any_of(ride.finished.begin() + static_cast<long>(keyframes_before),
                               ride.finished.end(), [](const FinishedKeyframe& keyframe) {
@@ -141,7 +142,7 @@ TEST(Estimator, AGapInTheImagesIsALoss) {
   ride.Advance(50);
   ASSERT_EQ(ride.last.state, EstimatorState::kTracking);
   VioTestWorld::Input gap;
-  for (int i = 0; i < 15; ++i) {  // 1.5 s of images never come, their samples do
+  for (int i = 0; i < 15; ++i) {  // 1.5 s of images are lost, but not their samples
     const VioTestWorld::Input next = ride.world.Next();
     gap.frame = next.frame;
     gap.imu.insert(gap.imu.end(), next.imu.begin(), next.imu.end());
@@ -149,7 +150,7 @@ TEST(Estimator, AGapInTheImagesIsALoss) {
   ride.Feed(gap);
   EXPECT_EQ(ride.last.state, EstimatorState::kLost);
   EXPECT_THAT(ride.last.reason, HasSubstr("no images"));
-  ride.Advance(1);  // and stays one
+  ride.Advance(1);  // it stays lost
   EXPECT_EQ(ride.last.state, EstimatorState::kLost);
 }
 

@@ -56,7 +56,7 @@ TEST(Estimator, StartsMoving) {
     EXPECT_LT((first.result.gyro_bias - first.truth.gyro_bias).norm(), 0.01);
     EXPECT_LT((first.result.accel_bias - first.truth.accel_bias).norm(), 0.35);
     EXPECT_NEAR(first.result.v_odom_body.norm(), first.truth.v_odom_body.norm(), 0.2);
-    // Scale: how far it went since.
+    // Scale: ratio of the distances since the first frame.
     const Ride::Frame& last = ride.tracked.back();
     const double true_length = (last.truth.T_odom_body.t - first.truth.T_odom_body.t).norm();
     const double length = (last.result.T_odom_body.t - first.result.T_odom_body.t).norm();
@@ -64,7 +64,7 @@ TEST(Estimator, StartsMoving) {
   }
 }
 
-// The rotation rate changes while the rows are read out: taken for an image of one time, four of
+// The rotation rate changes during the read-out. If the image is taken to be of one time, four of
 // five such starts come seconds later or never.
 TEST(Estimator, StartsWithARollingShutterInAHandThatShakes) {
   for (uint64_t seed = 1; seed <= 5; ++seed) {
@@ -79,8 +79,8 @@ TEST(Estimator, StartsWithARollingShutterInAHandThatShakes) {
   }
 }
 
-// Hardly shaken at an even 5 m/s, scale is all but unknown: a start may come late, or not at all,
-// but not at a third of the speed.
+// At an even 5 m/s with hardly any shaking, scale is almost unknown: a start may be late or
+// missing, but must not have a third of the speed.
 TEST(Estimator, ADrivesStartIsNotTooSmall) {
   VioTestWorldOptions options;
   options.drive_mps = 5;
@@ -91,7 +91,7 @@ TEST(Estimator, ADrivesStartIsNotTooSmall) {
   }
 }
 
-// Hardly two images are apart enough for a place in the window; what the start found must stay.
+// Hardly two images are far enough apart to be window keyframes; the start's result must be kept.
 TEST(Estimator, StartsRotatingOnTheSpot) {
   double squares = 0;
   for (uint64_t seed = 1; seed <= 4; ++seed) {
@@ -128,7 +128,7 @@ TEST(Estimator, StartsStationary) {
   EXPECT_LT(first.result.v_odom_body.norm(), 0.02);
   EXPECT_LT((first.result.gyro_bias - first.truth.gyro_bias).norm(), 2e-3);
   EXPECT_LT(TiltError(first.truth, first.result), 0.03);
-  const Ride::Frame& last = ride.tracked.back();  // 4 s on the move
+  const Ride::Frame& last = ride.tracked.back();  // after 4 s of motion
   EXPECT_LT(TiltError(last.truth, last.result), 0.01);
   const double true_length = (last.truth.T_odom_body.t - first.truth.T_odom_body.t).norm();
   EXPECT_NEAR((last.result.T_odom_body.t - first.result.T_odom_body.t).norm() / true_length, 1,
@@ -138,7 +138,7 @@ TEST(Estimator, StartsStationary) {
 TEST(Estimator, FollowsThePathForHalfAMinute) {
   VioTestWorldOptions options;
   options.seed = 3;
-  // Extrinsics that are further off than the estimator supposes, by three times.
+  // The errors of the extrinsics are three times as large as the estimator assumes.
   options.extrinsics_rotation_sigma = 0.003;
   options.extrinsics_position_sigma = 0.003;
   options.time_offset_sigma = 0.002;
@@ -149,13 +149,13 @@ TEST(Estimator, FollowsThePathForHalfAMinute) {
   std::cout << "ATE over 30 s: " << ate << " m\n";
   EXPECT_LT(ate, 0.12);
   EXPECT_LT(TiltError(ride.tracked.back().truth, ride.tracked.back().result), 0.01);
-  // The calibration got better, not worse.
+  // The calibration has improved.
   const CameraModel camera = ride.estimator.camera();
   EXPECT_NEAR(camera.time_offset_s, ride.world.true_time_offset_s(), 0.001);
   EXPECT_LT(LogSo3(camera.T_body_cam.q * ride.world.true_T_body_cam().q.conjugate()).norm(), 0.004);
 }
 
-// Of a ride's last keyframe: the depths' common error, and what it is said to be.
+// Of a ride's last keyframe: the common error of the depths, and the sigma stated for it.
 struct ScaleOf {
   double error = 0, sigma = 0;
 };
@@ -172,11 +172,12 @@ ScaleOf LastScale(Ride* ride) {
       return {Median(std::move(ratios)), *keyframe->scale_sigma};
     }
   }
-  return {0, 1};  // nothing is claimed
+  return {0, 1};  // no information is claimed
 }
 
-// A walk tells it, and no more is claimed than is known. Even motion does not, whatever its speed:
-// there more is claimed than is known (docs/maths_vio.md), but far less than on a walk.
+// On a walk the scale is observable, and its stated sigma fits its error. In even motion at any
+// speed it is not: then the stated sigma is too small (docs/maths_vio.md), but far larger than on a
+// walk.
 TEST(Estimator, KnowsHowWellItKnowsTheScale) {
   constexpr int kRides = 6;
   double squares = 0;
@@ -198,7 +199,7 @@ TEST(Estimator, KnowsHowWellItKnowsTheScale) {
   EXPECT_GT(squares, 0.06);
 }
 
-// As those of images stamped when they arrive.
+// Stamps as of images that are stamped on arrival.
 TEST(Estimator, AllowsForStampsThatJitter) {
   double exact = 0, jittering = 0;
   for (uint64_t seed = 1; seed <= 6; ++seed) {
@@ -230,7 +231,7 @@ TEST(Estimator, FindsATimeOffsetOfTensOfMilliseconds) {
   }
 }
 
-// Off by some three times what a calibration is taken to be.
+// The error is about three times the sigma that is assumed for a calibration.
 TEST(Estimator, FindsTheFocalLength) {
   for (const uint64_t seed : {2, 3}) {
     VioTestWorldOptions options;
@@ -252,7 +253,7 @@ TEST(Estimator, FindsTheFocalLength) {
   }
 }
 
-// A phone's lens, of which the calibration says nothing.
+// A phone's lens without a calibrated distortion.
 TEST(Estimator, FindsTheDistortion) {
   for (const uint64_t seed : {2, 3}) {
     VioTestWorldOptions options;
@@ -289,13 +290,13 @@ TEST(Estimator, StandsStillWithoutDrift) {
     squared_distance += (ride.last.T_odom_body.t - before.t).squaredNorm() / 2;
     squared_speed += ride.last.v_odom_body.squaredNorm() / 2;
     EXPECT_LT(LogSo3(ride.last.T_odom_body.q * before.q.conjugate()).norm(), 0.005);
-    // ... and walks on as if nothing had been.
+    // ... and the walk continues as if it had not stopped.
     ride.Advance(50);
     EXPECT_LT(Ate(ride), 0.1);
   }
   std::cout << "in 10 s " << std::sqrt(squared_distance) << " m, then at "
             << std::sqrt(squared_speed) << " m/s\n";
-  EXPECT_LT(std::sqrt(squared_distance), 0.05);  // one image's noise: 0.02
+  EXPECT_LT(std::sqrt(squared_distance), 0.05);  // the noise of one image: 0.02
   EXPECT_LT(std::sqrt(squared_speed), 0.02);
 }
 
@@ -316,7 +317,7 @@ TEST(Estimator, KeyframesAreCompleteConsistentAndHonest) {
     const uint64_t seed = ride.world.options().seed;
     ASSERT_FALSE(ride.tracked.empty()) << "seed " << seed << ": " << ride.last.reason;
 
-    // Every announced keyframe comes, in order, once.
+    // Every announced keyframe comes once, and in order.
     std::vector<int64_t> announced, came;
     for (const Ride::Frame& frame : ride.tracked) {
       if (frame.result.is_keyframe) {
@@ -347,7 +348,7 @@ TEST(Estimator, KeyframesAreCompleteConsistentAndHonest) {
       if (k == 0) {
         continue;
       }
-      // Edges chain to the published poses.
+      // Chained edges give the published poses.
       const FinishedKeyframe& previous = ride.finished[k - 1];
       const Vector6d gap =
           (previous.T_odom_body * keyframe.edge->T_previous_this).Minus(keyframe.T_odom_body);

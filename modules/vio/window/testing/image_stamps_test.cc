@@ -16,7 +16,7 @@ CameraModel Camera(double readout_s) {
   return camera;
 }
 
-// Image i is taken `interval_s(i)` after the one before it; the tenth sets the reference.
+// Image i is taken `interval_s(i)` after the previous one; the tenth sets the reference.
 ImageStamps Taken(double readout_s, int images, const std::function<double(int)>& interval_s) {
   ImageStamps stamps(Camera(readout_s));
   double t = 100;
@@ -52,12 +52,13 @@ TEST(ImageStamps, JitterIsNoLongerInterval) {
   for (int images = 30; images < 60; ++images) {
     EXPECT_EQ(Taken(0.03, images, jittering).excess_interval_s(), 0);
   }
-  // Nor after minutes: the stamps' error is the jitter alone, the interval's would be 0.0095.
+  // Also after minutes the stamps' error is that of the jitter alone; the interval's would be
+  // 0.0095.
   EXPECT_NEAR(Taken(0.03, 10'000, jittering).sigma_s(), 0.005, 0.003);
 }
 
 TEST(ImageStamps, WhereTheIntervalChangesTheExposureIsUnknown) {
-  // Uniform over half an interval.
+  // Uniform over half an interval, in either direction or not at all.
   EXPECT_NEAR(Taken(0.03, 25, SlowerAfter20).sigma_s(), 0.03 / std::sqrt(12), 1e-9);
   EXPECT_EQ(Taken(0.03, 20, SlowerAfter20).sigma_s(), 0);  // it has not changed yet
   EXPECT_EQ(Taken(0, 25, SlowerAfter20).sigma_s(), 0);     // a global shutter

@@ -35,7 +35,7 @@ TEST(ImuFactorTest, IsZeroForAnExactMotion) {
   }
 }
 
-// Against the equations of motion themselves: free fall is no measurement at all.
+// Compares with the equations of motion: in free fall the accelerometer measures zero.
 TEST(ImuFactorTest, PredictsAFall) {
   ImuState from;
   from.v_odom_body = {1, 2, 3};
@@ -47,7 +47,7 @@ TEST(ImuFactorTest, PredictsAFall) {
   EXPECT_LT((to.T_odom_body.t - Vector3d(0.5, 1, 1.5 - 0.125 * kGravity)).norm(), 1e-12);
 }
 
-// At states that are neither each other's prediction nor at the bias of linearisation.
+// At states that differ from each other's prediction and from the bias of the linearisation.
 TEST(ImuFactorTest, DerivativesMatchDifferencesInEveryColumn) {
   for (uint64_t seed = 1; seed <= 10; ++seed) {
     const WindowProblem problem = TwoFrames(seed);
@@ -79,7 +79,7 @@ TEST(ImuFactorTest, ShiftsAndRotationsTogetherAreFree) {
 }
 
 TEST(ImuFactorTest, InformationIsTheInverseOfTheCovariance) {
-  ImuNoise noise;  // coarse, so that the floors of integration do not show
+  ImuNoise noise;  // large, so that the minimum covariances of the integration have no effect
   noise.gyro_noise_density *= 1000;
   noise.accel_noise_density *= 1000;
   const auto samples = TestSamples(41, 0, 1);
@@ -87,7 +87,7 @@ TEST(ImuFactorTest, InformationIsTheInverseOfTheCovariance) {
   const auto information = InertialInformation(measured, noise);
   const Eigen::Matrix<double, 9, 9> product =
       information.topLeftCorner<9, 9>() * measured.covariance;
-  const Eigen::Matrix<double, 9, 9> scaled =  // entries of different units
+  const Eigen::Matrix<double, 9, 9> scaled =  // because the entries have different units
       measured.covariance.diagonal().cwiseSqrt().asDiagonal() * product *
       measured.covariance.diagonal().cwiseSqrt().cwiseInverse().asDiagonal();
   EXPECT_LT((scaled - Eigen::Matrix<double, 9, 9>::Identity()).cwiseAbs().maxCoeff(), 1e-3);
@@ -97,8 +97,7 @@ TEST(ImuFactorTest, InformationIsTheInverseOfTheCovariance) {
               1e-12);
 }
 
-// Samples with their noise and wandering biases: the residual of the true motion is what the
-// information says.
+// Samples with noise and random-walk biases: the residual at the true motion fits the information.
 TEST(ImuFactorTest, InformationIsHonest) {
   const ImuNoise noise;
   constexpr int kTrials = 400;
@@ -124,7 +123,8 @@ TEST(ImuFactorTest, InformationIsHonest) {
     const auto r = ComputeInertialResidual(measured, from, to).r;
     nees += r.dot(InertialInformation(measured, noise) * r) / kTrials;
   }
-  EXPECT_NEAR(nees, 15, 1.5);  // mean of 400 chi-square(15): 15 +- 0.27; the floors take a little
+  // mean of 400 chi-square(15): 15 +- 0.27; the minimum covariances reduce it slightly
+  EXPECT_NEAR(nees, 15, 1.5);
 }
 
 }  // namespace

@@ -47,7 +47,8 @@ TEST(PredictRay, DerivativesMatchDifferencesInEveryColumn) {
         };
         add_stamp(anchor, predicted->J_anchor_stamp);
         add_stamp(seen.frame, predicted->J_frame_stamp);
-        // The one thing neglected: an error of the velocity moves the pose on to the row's time.
+        // The analytic Jacobian neglects only this: an error of the velocity moves the pose at the
+        // row's time.
         J.middleCols<3>(state.Offset(anchor) + kVelocity) +=
             state.Ahead(anchor, landmark.point.anchor_row_s) * predicted->J_anchor.rightCols<3>();
         J.middleCols<3>(state.Offset(seen.frame) + kVelocity) +=

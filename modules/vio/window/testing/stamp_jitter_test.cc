@@ -30,7 +30,7 @@ TEST(StampJitter, IsFoundBesideLateStampsAndChangesOfTheRate) {
 
 TEST(StampJitter, OfExactStampsIsNone) {
   EXPECT_EQ(Found(0, 0, 60), 0);
-  EXPECT_EQ(Found(5e-5, 0.02, 60), 0);  // rounding, and a few that are late
+  EXPECT_EQ(Found(5e-5, 0.02, 60), 0);  // rounding errors, and a few late stamps
 }
 
 TEST(StampJitter, IsNotGuessedFromAFewStamps) { EXPECT_EQ(Found(0.005, 0, 7), 0); }

@@ -24,7 +24,7 @@ constexpr double kSight_m = 30;
 
 double Seconds(int64_t utime) { return 1e-6 * static_cast<double>(utime); }
 
-// Time along the path: runs with t, but stands in [begin, end], with soft ends.
+// Time along the path: passes like t, but stops in [begin, end], with smooth transitions.
 double PathTime(double t, double begin, double end) {
   constexpr double kSoft = 0.5;
   if (t <= begin) {
@@ -39,14 +39,14 @@ double PathTime(double t, double begin, double end) {
   return s;
 }
 
-// A hand's: rad for an acceleration of at most 1 rad/s^2 about each axis.
+// Rotation of a shaking hand, rad, for an acceleration of at most 1 rad/s^2 about each axis.
 Vector3d Shake(double s) {
   const Vector3d frequency(17.3, 21.9, 19.1);  // rad/s
   const Vector3d phase(0, 1, 2);
   return ((s * frequency + phase).array().sin() / frequency.array().square()).matrix();
 }
 
-// Their own generator: a world is the same with an exact IMU and with another.
+// With a generator of its own: the world is the same for an exact IMU and for another.
 ImuIntrinsics RandomImuIntrinsics(const ImuNoise& noise, uint64_t seed) {
   std::mt19937_64 rng(seed);
   ImuIntrinsics imu_intrinsics;
@@ -72,7 +72,8 @@ VioTestWorld::VioTestWorld(const VioTestWorldOptions& options)
   true_T_body_cam_.t = camera_.T_body_cam.t + RandomVector(rng_, options.extrinsics_position_sigma);
   true_time_offset_s_ = RandomVector(rng_, options.time_offset_sigma).x();
   true_intrinsics_ = camera_;
-  std::mt19937_64 intrinsics_rng(options.seed);  // of its own: the world stays as it is
+  // a separate generator, so that the rest of the world does not change
+  std::mt19937_64 intrinsics_rng(options.seed);
   const double longer = 1 + RandomVector(intrinsics_rng, options.focal_sigma).x();
   const Vector3d centre = RandomVector(intrinsics_rng, options.centre_sigma);
   true_intrinsics_.cx += camera_.fx * centre.x();
@@ -163,7 +164,7 @@ std::optional<Vector2d> VioTestWorld::Seen(const Vector3d& point, double t) cons
   return pixel;
 }
 
-// To the right of where the camera looks as it sets off.
+// Moves to the right of the camera's direction at the time when the crowd starts to move.
 Vector3d VioTestWorld::CrowdMoved(double t) const {
   const Eigen::Quaterniond q = PoseAt(options_.crowd_moves_s).q * true_T_body_cam_.q;
   Vector3d right = q * Vector3d::UnitX();
@@ -186,7 +187,7 @@ void VioTestWorld::ObserveCrowd(double t) {
   });
   const auto in_crowd = [](const auto& item) { return item.second.in_crowd; };
   auto count = static_cast<size_t>(std::count_if(tracks_.begin(), tracks_.end(), in_crowd));
-  if (count == 0 && wanted > 0) {  // it hides what is behind
+  if (count == 0 && wanted > 0) {  // the crowd hides the points behind it
     std::bernoulli_distribution hidden(options_.crowd_share);
     std::erase_if(tracks_, [&](const auto&) { return hidden(crowd_rng_); });
   }
@@ -243,7 +244,8 @@ TrackedFrame VioTestWorld::Observe(int64_t utime) {
 VioTestWorld::Input VioTestWorld::Next() {
   Input input;
   input.taken_utime = next_frame_utime_;
-  std::mt19937_64 rng(options_.seed + next_frame_utime_);  // of its own: the world stays as it is
+  // a separate one, so that the world does not change
+  std::mt19937_64 rng(options_.seed + next_frame_utime_);
   const int64_t stamp =
       next_frame_utime_ + std::llround(1e6 * RandomVector(rng, options_.stamp_jitter_s).x());
   const int64_t last_row_utime = stamp + std::llround(1e6 * options_.readout_s);

@@ -1,4 +1,4 @@
-// Whether a prior that was linearised again and again still knows nothing of position and yaw.
+// Tests that a prior has no information on position and yaw after many linearisations.
 
 #include <gtest/gtest.h>
 
@@ -18,13 +18,13 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr int kMarginalisations = 40;
-constexpr int kViews = 8;            // images a landmark is seen in, at most
-constexpr double kSpread = 0.01;     // of every error of the window, each time it is linearised
+constexpr int kViews = 8;            // largest number of images with a landmark
+constexpr double kSpread = 0.01;     // of every error of the window, at each linearisation
 constexpr double kRaySigma = 0.002;  // 0.8 px
 
-// A ride as one long window at its true state: inertial samples between its images, rays with
-// noise, and a prior that says nothing but of the IMU's axes: rotated together with body and camera
-// they are another body.
+// A ride as one long window at its true state, with inertial samples between its images and noisy
+// rays. Its prior has only information on the IMU's axes: rotated together with body and camera,
+// they would be those of another body.
 WindowProblem Ride(uint64_t seed) {
   VioTestWorldOptions options;
   options.seed = seed;
@@ -32,7 +32,7 @@ WindowProblem Ride(uint64_t seed) {
   VioTestWorld world(options);
   WindowProblem problem;
   problem.state.T_body_cam = world.camera().T_body_cam;
-  std::map<int32_t, Landmark> open;  // still to be seen again
+  std::map<int32_t, Landmark> open;  // landmarks that can still be seen again
   ImuSample last_sample;
   for (int i = 0; i < kMarginalisations + kViews; ++i) {
     VioTestWorld::Input input = world.Next();
@@ -76,9 +76,9 @@ WindowProblem Ride(uint64_t seed) {
   return problem;
 }
 
-// What a prior that is kept in plain errors (dtheta, dp, dv), as most odometries do, says in the
-// window's at a new state. With xi = d + value x dtheta, the same plain error is there
-// xi_then = xi_now + (value_then - value_now) x dtheta.
+// Most odometries keep a prior in plain errors (dtheta, dp, dv). Returns the information of such a
+// prior in the window's coordinates at a new state. With xi = d + value x dtheta, the same plain
+// error there is xi_then = xi_now + (value_then - value_now) x dtheta.
 MatrixXd KeptInPlainErrors(const WindowPrior& prior, const WindowState& now) {
   MatrixXd H = prior.H;
   for (int side = 0; side < 2; ++side) {
@@ -94,7 +94,8 @@ MatrixXd KeptInPlainErrors(const WindowPrior& prior, const WindowState& now) {
   return H;
 }
 
-// The prior after all marginalisations, each with every frame linearised anew around the truth.
+// The prior after all marginalisations, for each of which all frames are linearised anew around the
+// truth.
 WindowPrior Marginalised(WindowProblem problem, bool plain_errors) {
   WindowState truth = problem.state;
   for (int round = 0; round < kMarginalisations; ++round) {
@@ -110,14 +111,14 @@ WindowPrior Marginalised(WindowProblem problem, bool plain_errors) {
   return problem.prior;
 }
 
-// Information, each row in units of what it alone would know: the most about a shift or a rotation
-// about the vertical, and the least about any direction across these.
+// Eigenvalues of the information, with rows scaled to a unit diagonal: the largest for a shift or a
+// rotation about the vertical, and the smallest for the directions perpendicular to these.
 struct Knowledge {
   double of_gauge = 0;
   double of_the_rest = 0;
 };
 Knowledge Known(const WindowPrior& prior) {
-  std::vector<int> rows;  // that the prior speaks of
+  std::vector<int> rows;  // rows on which the prior has information
   for (int i = 0; i < prior.H.rows(); ++i) {
     if (prior.H(i, i) > 0) {
       rows.push_back(i);
@@ -144,7 +145,7 @@ TEST(WindowGauge, FortyMarginalisationsLearnNothingOfPositionAndYaw) {
               << ", the least known of the rest " << invariant.of_the_rest << "; with plain errors "
               << plain.of_gauge << ", " << plain.of_the_rest << "\n";
     EXPECT_LT(invariant.of_gauge, 1e-5 * invariant.of_the_rest) << "seed " << seed;
-    // Errors that are not invariant learn on the same ride: this measure would show it.
+    // Errors that are not invariant gain information on the same ride, so this measure detects it.
     EXPECT_GT(plain.of_gauge, 0.1 * invariant.of_the_rest) << "seed " << seed;
   }
 }

@@ -18,7 +18,7 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// Noisy rays, and every second frame pair stationary as far as the factors are concerned.
+// Noisy rays; the factors take every second pair of frames as stationary.
 WindowProblem NoisyWindow(uint64_t seed) {
   WindowTestOptions options;
   options.seed = seed;
@@ -29,7 +29,7 @@ WindowProblem NoisyWindow(uint64_t seed) {
   return problem;
 }
 
-// The landmarks' best for the window as it is.
+// Moves the landmarks to their optimum for the fixed window.
 void SettleLandmarks(WindowProblem* problem) {
   for (int iteration = 0; iteration < 40; ++iteration) {
     const NormalEquations equations = Linearise(*problem, 0);
@@ -58,7 +58,8 @@ TEST(WindowState, DifferenceUndoesRetract) {
   EXPECT_LT((Difference(moved, problem.state) - error).norm(), 1e-12);
 }
 
-// With the landmarks at their best the gradient of the reduced cost is that of the whole one.
+// With the landmarks at their optimum, the gradients of the reduced and of the whole cost are
+// equal.
 TEST(WindowProblem, TheGradientMatchesDifferences) {
   for (uint64_t seed = 1; seed <= 3; ++seed) {
     WindowProblem problem = NoisyWindow(seed);
@@ -66,7 +67,7 @@ TEST(WindowProblem, TheGradientMatchesDifferences) {
     problem.prior.at = problem.state;
     problem.prior.g = RandomError(problem.state, 100, seed + 10);
     SettleLandmarks(&problem);
-    // Some rays pull with constant force.
+    // One ray pulls with constant force.
     problem.landmarks[0].rays.back().ray.x() += 20 * problem.landmarks[0].rays.back().sigma;
     SettleLandmarks(&problem);
     const NormalEquations equations = Linearise(problem, 0);
@@ -81,10 +82,10 @@ TEST(WindowProblem, TheGradientMatchesDifferences) {
   }
 }
 
-// Where all residuals vanish Gauss and Newton agree: H is the derivative of the reduced gradient.
+// If all residuals vanish, Gauss-Newton is exact: H is the derivative of the reduced gradient.
 TEST(WindowProblem, TheInformationMatchesDifferences) {
   WindowProblem problem = TestWindow({});
-  // A stationary window: zero residual there, too.
+  // A stationary window also has zero residuals.
   for (WindowFrame& frame : problem.state.frames) {
     frame.stationary = true;
     frame.imu = problem.state.frames[0].imu;
@@ -94,11 +95,11 @@ TEST(WindowProblem, TheInformationMatchesDifferences) {
     factor.reset();
   }
   problem.landmarks.clear();
-  problem.imu_factors[1] = ImuFactor{};  // says nothing, but the two frames are neighbours
+  problem.imu_factors[1] = ImuFactor{};  // no information, but it makes the two frames neighbours
   problem.imu_factors[1]->information.setZero();
   const WindowProblem standing = problem;
   const WindowProblem moving = TestWindow({});
-  // Jittering stamps: zero residual, and no time ahead in which the velocity would count.
+  // Jittering stamps with zero residuals, and no time ahead in which the velocity would count.
   WindowProblem jittering = TestWindow({.stamp_sigma_s = 1e-9});
   for (WindowFrame& frame : jittering.state.frames) {
     frame.stamp_sigma_s *= 1e6;
@@ -118,7 +119,7 @@ TEST(WindowProblem, TheInformationMatchesDifferences) {
 
 void ExpectNothingKnown(const MatrixXd& H, const VectorXd& g, const WindowState& state) {
   const MatrixXd N = UnobservableDirections(state);
-  // Beside what each row could say: |H| |N|.
+  // Relative to the information of each row: |H| |N|.
   const MatrixXd size = H.cwiseAbs() * N.cwiseAbs() + MatrixXd::Constant(N.rows(), 4, 1e-6);
   EXPECT_LT((H * N).cwiseQuotient(size).cwiseAbs().maxCoeff(), 2e-8);
   const VectorXd g_size = N.cwiseAbs().transpose() * g.cwiseAbs();
@@ -134,7 +135,7 @@ TEST(WindowProblem, PositionAndYawAreNotObservedAnywhere) {
   }
 }
 
-// ... nor after frames have left at one point, and the rest is linearised at another.
+// ... nor after frames are marginalised at one point and the rest is linearised at another.
 TEST(WindowProblem, MarginalisationLearnsNothingOfPositionAndYaw) {
   for (uint64_t seed = 1; seed <= 5; ++seed) {
     for (const bool keep_pose : {false, true}) {
@@ -153,7 +154,7 @@ TEST(WindowProblem, MarginalisationLearnsNothingOfPositionAndYaw) {
   }
 }
 
-// The rows of a window that are left when the oldest full frame goes.
+// The rows of a window that are left when the oldest full frame is marginalised.
 std::vector<int> RowsLeft(const WindowState& state, const Marginalisation& what) {
   const int oldest = state.frames[0].pose_only ? 1 : 0;
   std::vector<int> rows;
@@ -220,7 +221,7 @@ TEST(WindowProblem, FramesImuFactorsAndRaysFollowAMarginalisation) {
   EXPECT_TRUE(problem.state.frames[0].pose_only);
   EXPECT_FALSE(problem.imu_factors[0] || problem.imu_factors[1]);
   EXPECT_TRUE(problem.imu_factors[2]);
-  EXPECT_EQ(problem.landmarks.size(), 9u);  // a quarter was anchored in the frame that left
+  EXPECT_EQ(problem.landmarks.size(), 9u);  // a quarter was anchored in the removed frame
 
   MarginaliseOldest(problem, {.drop_kept_pose = true});
   ASSERT_EQ(problem.state.frames.size(), 3u);
@@ -238,7 +239,7 @@ TEST(WindowProblem, FramesImuFactorsAndRaysFollowAMarginalisation) {
   }
 }
 
-// A perturbed window and its truth, the start held there.
+// A perturbed window and its truth; the start is fixed at the truth.
 struct Perturbed {
   WindowProblem truth, problem;
 };
@@ -250,7 +251,7 @@ Perturbed Perturb(uint64_t seed, double sigma, double rho_factor, double stamp_s
   Perturbed out;
   out.truth = TestWindow(options);
   for (WindowFrame& frame : out.truth.state.frames) {
-    frame.stamp_sigma_s *= 1e6;  // the truth is to cost nothing
+    frame.stamp_sigma_s *= 1e6;  // the truth must have zero cost
   }
   HoldStart(&out.truth, 1e-3);
   out.problem = out.truth;
@@ -280,7 +281,7 @@ TEST(Optimise, FindsBackFromAPerturbation) {
   }
 }
 
-// The undamped step of Gauss and Newton.
+// The undamped Gauss-Newton step.
 WindowProblem FullStep(const WindowProblem& problem) {
   WindowProblem moved = problem;
   const NormalEquations equations = Linearise(problem, 0);
@@ -304,7 +305,7 @@ WindowProblem FullStep(const WindowProblem& problem) {
   return moved;
 }
 
-// Points that start ten times too far, and no inertial measurement that would hold the frames.
+// Points start at ten times their distance, and no inertial measurement constrains the frames.
 TEST(Optimise, DampsWhenTheFullStepIsWorse) {
   int worse = 0;
   for (uint64_t seed = 1; seed <= 50; ++seed) {
@@ -320,7 +321,7 @@ TEST(Optimise, DampsWhenTheFullStepIsWorse) {
     WindowProblem once = window.problem;
     Optimise(once, 1);
     EXPECT_LT(Cost(once), start) << "seed " << seed;
-    EXPECT_LT(Optimise(window.problem, 50), 0.02) << "seed " << seed;  // the truth costs nothing
+    EXPECT_LT(Optimise(window.problem, 50), 0.02) << "seed " << seed;  // the truth has zero cost
   }
   EXPECT_GT(worse, 0);
 }
@@ -335,8 +336,8 @@ TEST(StartPrior, IsTheInitialisersCovarianceInTheWindowsCoordinates) {
       spread * spread.transpose() + 1e-2 * Eigen::Matrix<double, 15, 15>::Identity();
   const WindowPrior prior = StartPrior(start, plain, CameraModel{}, {}, ImuNoise{});
   const MatrixXd P = prior.H.inverse();
-  // Errors drawn as the initialiser means them, seen as the window does: p + dp = Exp(dtheta) p +
-  // xi.
+  // Errors drawn in the initialiser's coordinates, converted to the window's: p + dp = Exp(dtheta)
+  // p + xi.
   const MatrixXd J = pangea::NumericJacobian(15, 1e-6, [&](const VectorXd& d) -> VectorXd {
     WindowState moved = start;
     ImuState& imu = moved.frames[0].imu;
@@ -352,8 +353,8 @@ TEST(StartPrior, IsTheInitialisersCovarianceInTheWindowsCoordinates) {
   EXPECT_NEAR(std::sqrt(P(kImuIntrinsics, kImuIntrinsics)), 0.002, 1e-7);  // the gyro's x by x
   EXPECT_NEAR(std::sqrt(P(kImuIntrinsics + 9, kImuIntrinsics + 9)), 0.001,
               1e-7);  // the accelerometer's
-  // The gyro's y by x and x by y are the same: it is not rotated against the body. What they were
-  // before rotates the accelerometer.
+  // The gyro's y by x and x by y are equal, as the gyro is not rotated relative to the body. Their
+  // former antisymmetric part rotates the accelerometer instead.
   const double variance = 0.002 * 0.002;
   EXPECT_NEAR(P(kImuIntrinsics + 1, kImuIntrinsics + 1), 0.5 * variance, 1e-9);
   EXPECT_NEAR(P(kImuIntrinsics + 1, kImuIntrinsics + 3), 0.5 * variance, 1e-9);

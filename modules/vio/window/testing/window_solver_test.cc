@@ -33,12 +33,13 @@ void ExpectTheDenseSolution(const WindowProblem& problem) {
   const VectorXd scale = equations.H.diagonal().cwiseSqrt();
   const MatrixXd difference = scale.asDiagonal() * (x - dense);
   EXPECT_LT(difference.norm(), 1e-8 * (scale.asDiagonal() * dense).norm());
-  // To the last bit it is only where a wrong factor has handed over to the dense solver.
+  // If both were equal to the last bit, a wrong factor would have passed the work to the dense
+  // solver.
   EXPECT_NE(x, dense);
 }
 
-// A new window; then with what marginalisations leave: a prior on velocity and biases of the oldest
-// frame and on all that it saw, with and without a kept pose before it.
+// A new window, then windows after marginalisations: these have a prior on velocity and biases of
+// the oldest frame and on all that it saw, with and without a kept pose before it.
 TEST(SolveWindow, IsTheDenseSolution) {
   for (const double stamp_sigma_s : {0.0, 0.004}) {
     for (const bool keep_pose : {false, true}) {
@@ -52,8 +53,8 @@ TEST(SolveWindow, IsTheDenseSolution) {
   }
 }
 
-// A matrix that rounding has made indefinite has no factor: then it is the dense one's solution,
-// too.
+// A matrix that is indefinite by rounding has no Cholesky factor: then the dense solver's result is
+// returned.
 TEST(SolveWindow, TakesWhatIsNotPositive) {
   const WindowProblem problem = NoisyWindow(4, 0);
   NormalEquations equations = Linearise(problem, 0);

@@ -18,7 +18,7 @@ constexpr double kRaySigma = 2e-3;
 WindowFrame FirstFrame(double time_offset_s, std::mt19937_64& rng) {
   WindowFrame frame;
   frame.time_offset_s = time_offset_s;
-  // Far from zero: where wrong position columns show.
+  // Far from zero, where wrong position columns have an effect.
   frame.imu.T_odom_body = {ExpSo3(RandomVector(rng, 0.1)),
                            Vector3d(3, -2, 1) + RandomVector(rng, 0.5)};
   frame.imu.v_odom_body = RandomVector(rng, 1);
@@ -60,7 +60,7 @@ Landmark SeenLandmark(const WindowState& state, int id, const WindowTestOptions&
       seen.J_intrinsics.col(k) = RandomVector(rng, 1).head<2>();
     }
     const Vector3d noise = RandomVector(rng, options.ray_noise * kRaySigma);
-    // Where the prediction is the ray itself.
+    // Iterates until the ray equals its prediction.
     for (int k = 0; k < 20; ++k) {
       RowViews rows(state);
       seen.ray = PredictRayOnly(rows, InOdom(rows, landmark.point), seen).value();
@@ -95,7 +95,7 @@ WindowProblem TestWindow(const WindowTestOptions& options) {
   std::mt19937_64 rng(options.seed);
   WindowProblem problem;
   WindowState& state = problem.state;
-  // A little askew.
+  // A small rotation and shift of the camera.
   state.T_body_cam = {LookingAhead() * ExpSo3(RandomVector(rng, 0.1)), RandomVector(rng, 0.1)};
   state.time_offset_s = 0.002 + options.late_s;
   state.intrinsics << RandomVector(rng, 0.01), RandomVector(rng, 0.01).head<2>();
