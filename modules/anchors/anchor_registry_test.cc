@@ -28,7 +28,7 @@ AnchorEdit Edit(int64_t revision, int32_t agent_id, const std::string& name, Pla
 
 TEST(AnchorRegistry, TheOrderOfArrivalDoesNotMatter) {
   AnchorEdit refused = Edit(9, 3, "no", Placement::kKeyframe);
-  refused.right = AnchorRight::kEditOwn;  // of another's
+  refused.right = AnchorRight::kEditOwn;  // the anchor is another agent's
   const std::vector<AnchorEdit> edits = {Edit(1, 1, "made", Placement::kKeyframe),
                                          Edit(2, 2, "moved", Placement::kKeyframe),
                                          Edit(3, 1, "renamed", Placement::kSame),

@@ -33,7 +33,7 @@ TEST(Calibrate, IsAsFarOffAsItSays) {
     options.slower = 1.4;
     options.interval_share = -0.4;
     TestWorld world = MakeTestWorld(options);
-    // This one is exact.
+    // This IMU is exact.
     world.input.imu_noise.axes_sigma = world.input.imu_noise.gyro_scale_sigma = 0;
     world.input.least_gyro_scale_sigma = 0;
     const Result result = Calibrate(world.input);
@@ -79,7 +79,8 @@ TEST(Calibrate, FindsTheOffsetThatGrowsWithTheInterval) {
   EXPECT_NEAR(result.parameters.interval_share, -0.5, 4 * result.sigma[kIntervalShare]);
   EXPECT_LT(result.sigma[kIntervalShare], 0.1);
   EXPECT_LT(result.sigma_px, 1.2 * options.pixel_sigma);
-  // Offsets of a sixtieth of a second in half the images, about the usual interval's.
+  // Half of the images have an offset of a sixtieth of a second, relative to that of the usual
+  // interval.
   EXPECT_NEAR(result.time_offset_spread_s, 0.5 / 60 * std::sqrt(0.5), 0.002);
 }
 
@@ -156,7 +157,7 @@ TEST(Calibrate, RefusesGivenAxesWithALocalMinimum) {
   EXPECT_THAT(Calibrate(world.input).refused, HasSubstr("do not point along the IMU's -z,x,-y"));
 }
 
-// Then the given axes decide.
+// The motion does not determine the axes, so the given ones decide.
 TEST(Calibrate, TakesGivenAxesWhereTheMotionDoesNotTell) {
   TestWorldOptions options = Short(3);
   options.rotation_rms = {1e-4, 0.6, 1e-4};

@@ -166,7 +166,7 @@ TEST_F(MetricsTest, AssociationSkipsHolesAndWhatIsOutside) {
     estimate.push_back({1'000'000'000 + i * int64_t{50'000} + 10'000, Rigid3()});
   }
   const auto pairs = Associate(estimate, reference);
-  // 99 intervals are in the reference, 21 of them in the hole (39 to 60).
+  // The reference has 99 intervals; 21 of them are in the hole (39 to 60).
   EXPECT_EQ(pairs.size(), 99U - 21U);
   EXPECT_EQ(Associate(estimate, reference, 2'000'000).size(), 99U);
 }

@@ -156,7 +156,7 @@ TEST(GlobalBa, AMessageOfTheGroupDropsTheWorkAndOtherMessagesDoNot) {
   elsewhere.id.map = {9, 9};
   server.ba.Take(elsewhere);
   server.ba.Take(messages.keyframes.front());    // a repeat
-  server.ba.Take(messages.constraints.front());  // another
+  server.ba.Take(messages.constraints.front());  // another constraint
   EXPECT_EQ(server.ba.counters().dropped, 0);
   Keyframe next = messages.keyframes.back();
   ++next.id.seq;

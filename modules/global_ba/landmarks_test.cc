@@ -19,7 +19,7 @@ namespace {
 
 constexpr int kKeyframes = 6;
 
-// Two agents, exact rays, exact poses.
+// Two agents with exact rays and poses.
 struct Group {
   Group()
       : truth(MakeBaTestWorld({.keyframes = kKeyframes,
@@ -47,7 +47,7 @@ struct Group {
   std::vector<MatchedPlaces> places;
 };
 
-// Landmarks that keyframes of both agents see.
+// Number of landmarks that keyframes of both agents see.
 int CountShared(const BaWorld& world) {
   std::map<int, std::array<bool, 2>> seen_by;
   for (const BaObservation& seen : world.observations) {

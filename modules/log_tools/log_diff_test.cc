@@ -42,7 +42,7 @@ class LogDiffTest : public testing::Test {
 TEST_F(LogDiffTest, TheSameMessagesAtOtherTimesAreTheSame) {
   const LogDiff diff = DiffLogs(Log("a", {1, 2, 3}), Log("b", {1, 2, 3}));
   EXPECT_EQ(diff.First(), nullptr);
-  ASSERT_EQ(diff.channels.size(), 2u);  // nobody's status
+  ASSERT_EQ(diff.channels.size(), 2u);  // status messages are not compared
   EXPECT_EQ(diff.channels[0].count_a, 3);
   EXPECT_THAT(ToText(diff), HasSubstr("no message differs"));
 }

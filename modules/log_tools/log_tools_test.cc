@@ -1,4 +1,4 @@
-// pangea-log's parts on the captured sample session.
+// Tests pangea-log's parts on the captured sample session.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -130,7 +130,7 @@ TEST_F(LogToolsTest, CutsAddUpToTheWhole) {
   auto all = Events(kSample), merged = Events(Path("ab.lcm"));
   std::ranges::sort(all);
   std::ranges::sort(merged);
-  EXPECT_TRUE(merged == all);  // too long to print
+  EXPECT_TRUE(merged == all);  // too long to print the difference
 }
 
 // By capture time, but each log keeps its own order: its stamps may decrease.
@@ -210,7 +210,7 @@ TEST_F(LogToolsTest, AG2oFileComesBackIntoTheLog) {
   for (const auto& [number, pose] : lifted.vertices) {
     EXPECT_LT(again.graph.vertices.at(number).Minus(pose).norm(), 1e-7);
   }
-  // Twice is no more than once: the newest counts.
+  // A second import adds nothing: the newest state counts.
   std::ofstream(Path("graph.g2o")) << ToG2o(named.graph);
   ImportG2o(Path("lifted.lcm"), Path("graph.g2o"), Path("back.lcm"));
   EXPECT_NEAR(Cost(GraphOf(Path("back.lcm")).graph) / Cost(named.graph), 1, 1e-5);

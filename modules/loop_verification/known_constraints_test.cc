@@ -69,7 +69,7 @@ TEST_F(KnownConstraintsTest, TheSecondAtOnePlaceBringsHalfABitTheThirdLess) {
 
 TEST_F(KnownConstraintsTest, OdometryBetweenAddsItsDriftOnBothSides) {
   known_.Add(Accepted({kA, 10}, {kB, 10}, 0.02));
-  // 1 + 2 steps of 0.5 m, 2 % of them.
+  // The 1 + 2 steps are 1.5 m long, and the drift is 2 % of that.
   const double drift_m = 0.02 * 1.5;
   const double expected = 0.5 * std::log2(1 + (0.02 * 0.02 + drift_m * drift_m) / (0.02 * 0.02));
   EXPECT_NEAR(GainBits({kB, 12}, {kA, 9}), expected, 1e-9);
@@ -77,7 +77,7 @@ TEST_F(KnownConstraintsTest, OdometryBetweenAddsItsDriftOnBothSides) {
   EXPECT_FALSE(known_.IsRedundant({kB, 14}, {kA, 14}, store_));
 }
 
-// Otherwise the decision would depend on which of them is verified first.
+// Otherwise the decision would depend on the order of verification.
 TEST_F(KnownConstraintsTest, OnlyWhatACandidateRestsOnCounts) {
   known_.Add(Accepted({kA, 10}, {kB, 11}, 0.02));
   EXPECT_TRUE(std::isinf(GainBits({kB, 10}, {kA, 11})));
@@ -87,7 +87,7 @@ TEST_F(KnownConstraintsTest, OnlyWhatACandidateRestsOnCounts) {
   EXPECT_FALSE(std::isinf(GainBits({kA, 13}, {kB, 12}))) << "either may have been the query";
 }
 
-// The decision to merge two maps depends on them.
+// The decision to merge two maps depends on the first constraints between them.
 TEST_F(KnownConstraintsTest, TheFirstBetweenTwoMapsAreNeverRedundant) {
   KnownConstraints known({.min_between_maps = 2});
   known.Add(Accepted({kA, 10}, {kB, 10}, 0.02));

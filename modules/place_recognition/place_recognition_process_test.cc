@@ -154,7 +154,7 @@ TEST(PlaceRecognitionProcess, AsksForAGapAndForALostTail) {
   server.Send(keyframes[0]);
   server.Send(keyframes[2]);
   server.Tick();
-  EXPECT_TRUE(server.requests.empty());  // it may be under way
+  EXPECT_TRUE(server.requests.empty());  // the message may be under way
   server.Tick();
   ASSERT_EQ(server.requests.size(), 1u);
   EXPECT_EQ(server.requests[0].channel, "KEYFRAME_1");
@@ -277,7 +277,7 @@ TEST(PlaceRecognitionProcess, AfterARestartTheKindsAreThoseOfTheGroups) {
   restarted(told);
   told.Fused({kMapA, kMapB});
   EXPECT_EQ(kind(told), place_candidate_t::KIND_INTER);
-  Server alone;  // nobody answers
+  Server alone;  // no process answers
   restarted(alone);
   for (int i = 0; i < 30; ++i) {
     alone.Tick();

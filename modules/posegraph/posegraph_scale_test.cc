@@ -75,7 +75,7 @@ TEST(PoseGraphScale, LoopsOfALoneMapDoNotShrinkIt) {
   EXPECT_EQ(graph.counters().not_metric, 1);
 }
 
-// Whichever map came first and therefore defines the map frame.
+// For each map as the first one, which defines the map frame.
 TEST(PoseGraphScale, IsFoundWhereMetricMapsOverlap) {
   for (uint64_t seed = 1; seed <= 6; ++seed) {
     SyntheticWorld world = MakeSyntheticWorld(PosesOnly(2, 120, seed));

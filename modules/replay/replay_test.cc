@@ -22,7 +22,7 @@ const std::filesystem::path kSample =
     std::filesystem::path(PANGEA_SOURCE_DIR) / "logs" / "two_walks" / "session.lcm";
 constexpr double kUntil_s = 3;
 
-// What is told of a replay in which nothing takes less than ten seconds.
+// The progress that a replay prints if ten seconds pass between any two queries of the clock.
 template <typename Run>
 std::string Told(Run run) {
   std::ostringstream out;
@@ -51,7 +51,7 @@ TEST(Replay, TellsHowFarItIs) {
   std::filesystem::remove(log + ".part");
 }
 
-// The sample's first seconds, with an anchor that agent 1 placed after a keyframe of its.
+// The sample's first seconds, with an anchor that agent 1 placed after one of its keyframes.
 class ReplayOfAnchors : public testing::Test {
  protected:
   ReplayOfAnchors() {
@@ -63,7 +63,7 @@ class ReplayOfAnchors : public testing::Test {
       file.Write(keyframe.captured_utime, keyframe.channel, keyframe.data);
       if (keyframe.id.seq == 2) {
         file.Write(keyframe.captured_utime, "ANCHOR_EDIT", EncodeMessage(EditAt(keyframe.id, seq)));
-        // As agent_handler repeats the newest.
+        // agent_handler repeats the newest edit in the same way.
         file.Write(keyframe.captured_utime, "ANCHOR_EDIT", EncodeMessage(EditAt(keyframe.id, seq)));
         ++seq;
       }
@@ -121,7 +121,7 @@ TEST_F(ReplayOfAnchors, PlacesThemAgainTheSame) {
   EXPECT_EQ(On("ANCHOR", log_ + ".part"), anchors);
 }
 
-// No process makes it again.
+// No process computes it again.
 TEST_F(ReplayOfAnchors, TakesAlongWhatAThinningDerived) {
   const auto keyframes = ReadKeyframeLog(kSample);
   Constraint derived;

@@ -12,7 +12,7 @@ using nlohmann::ordered_json;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-// Two agents: fused at 20 s, taken apart at 25 s, fused again at 30 s and once more with a third
+// Two agents: fused at 20 s, separated at 25 s, fused again at 30 s and once more, with a third
 // map.
 ordered_json Report() {
   return ordered_json::parse(R"({

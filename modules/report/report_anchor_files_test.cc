@@ -1,4 +1,4 @@
-// Anchors from the logs to all three reports, and the picture of them.
+// Tests anchors from the logs to all three reports, and their picture.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -28,7 +28,7 @@ const Eigen::Vector3d kPlace{4, 0, 10};  // above the walks; the cameras look up
 const Eigen::Vector3d kOffset{0.03, 0, 0};
 constexpr double kPlaced = 6;  // seconds of agent 1's recording
 
-// Where an agent's odometry has a true place, at a time of its recording.
+// A true position, seen in an agent's odom frame, at a time of its recording.
 Rigid3 InOdom(int32_t agent, double s, const Eigen::Vector3d& p_truth) {
   Rigid3 T_odom_anchor;
   T_odom_anchor.t = Odometry(agent, s) * (Truth(agent, s).Inverse() * p_truth);
@@ -42,7 +42,7 @@ class ReportAnchorFiles : public ReportWorld {
     LogBoth();
     LogState(State(1, {Map(1), Map(2)}, NumKeyframes()));
     log_->Write(std::string(channels::kAnchorEdit), ToMessage(Edit()));
-    log_->Write(std::string(channels::kAnchorEdit), ToMessage(Edit()));  // said again
+    log_->Write(std::string(channels::kAnchorEdit), ToMessage(Edit()));  // a repeat
     WriteAgent(1);
     WriteAgent(2);
   }
@@ -61,7 +61,7 @@ class ReportAnchorFiles : public ReportWorld {
     return edit;
   }
 
-  // Four poses a second of the log, so that most are long after the fusion.
+  // Writes four poses per second of the log, so that most are long after the fusion.
   void WriteAgent(int32_t agent) {
     AgentRun& run = input_.agents[static_cast<size_t>(agent - 1)];
     run.bus_log = fmt::format("{}/with_anchors_{}.lcm", folder_, agent);
@@ -90,7 +90,7 @@ class ReportAnchorFiles : public ReportWorld {
     }
   }
 
-  // What was only ground truth becomes a recording with images, one a second.
+  // Makes a folder with only ground truth a recording with images, one per second.
   void AddImages(int32_t agent) const {
     const std::string mav0 = Recording(agent) + "/mav0";
     const std::string identity =

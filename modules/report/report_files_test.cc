@@ -1,5 +1,5 @@
-// What the report leaves in its folder, also when something is missing or damaged, and what it says
-// of that.
+// Tests the files that the report writes, also if something is missing or damaged, and its messages
+// about that.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -151,9 +151,9 @@ TEST_F(ReportFilesTest, ThePointCloudIsColouredByAgentAndHasEachLandmarkOnce) {
   LogState(State(1, {Map(1), Map(2)}, NumKeyframes()));
   Report();
   const std::string ply = Text("map.ply");
-  // Per agent one common landmark and one per keyframe; the uncertain ones are left out.
+  // For each agent: one common landmark, and one per keyframe; uncertain ones are left out.
   EXPECT_THAT(ply, HasSubstr(fmt::format("element vertex {}\n", 2 * (1 + NumKeyframes()))));
-  // The common landmark is best known from keyframe 0: 2 m ahead of it.
+  // The common landmark is most certain from keyframe 0: 2 m ahead of it.
   const Eigen::Vector3d p = OdomFromTruth(1) * Truth(1, Seconds(0)) * Eigen::Vector3d(0, 0, 2);
   EXPECT_THAT(ply, HasSubstr(fmt::format("{:.4f} {:.4f} {:.4f} 0 114 178\n", p.x(), p.y(), p.z())));
   EXPECT_THAT(ply, HasSubstr(" 213 94 0\n"));

@@ -1,4 +1,4 @@
-// What the report says of two agents' maps: metrics, groups, poses.
+// Tests the report's contents for two agents' maps: metrics, groups, poses.
 
 #include "report/report.h"
 
@@ -25,7 +25,7 @@ using ReportTest = ReportWorld;
 TEST_F(ReportTest, TwoAgentsFused) {
   LogBoth();
   LogConstraint(3, true, "");
-  LogConstraint(3, true, "");  // said again
+  LogConstraint(3, true, "");  // a repeat
   LogConstraint(4, false, "yaw of 31.5 deg is above the gate of 30 deg");
   LogConstraint(5, false, "yaw of 40 deg is above the gate of 30 deg");
   LogState(State(1, {Map(1), Map(2)}, 20));

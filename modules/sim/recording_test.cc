@@ -27,7 +27,7 @@ class Recording : public testing::Test {
   }
   void TearDown() override { fs::remove_all(root_); }
 
-  // Half a second in a small coarse room.
+  // A recording of half a second in a small coarse room.
   RecordingOptions Small(const std::string& name) const {
     RecordingOptions options;
     options.out = (root_ / name).string();

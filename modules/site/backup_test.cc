@@ -17,12 +17,12 @@
 
 namespace {
 
-// Of what is written next the first byte is another one on the disk.
+// If set, the disk stores a wrong first byte of the next write.
 std::atomic<bool> disk_lies = false;
 
 }  // namespace
 
-// In place of the C library's, in this program.
+// Replaces the C library's function in this program.
 extern "C" ssize_t pwrite(int fd, const void* data, size_t size, off_t offset) {
   const auto* const first = static_cast<const uint8_t*>(data);
   std::vector<uint8_t> bytes(first, first + size);
@@ -89,12 +89,13 @@ TEST_P(BackupTest, BringsKeysIfWantedReadableByTheirOwnerAlone) {
 
 TEST_P(BackupTest, EndsBehindTheLastGroupThatIsWrittenToItsEnd) {
   const std::vector<StoredEvent> events = EventsOf(site);
-  fs::resize_file(site.journal(), fs::file_size(site.journal()) - 5);  // of its last CHECKSUMS
+  // Cuts the last CHECKSUMS event
+  fs::resize_file(site.journal(), fs::file_size(site.journal()) - 5);
   BackUp(site, copy, false);
   Restore(copy, folder / "again");
   const std::vector<StoredEvent> kept = EventsOf(ReadSite(folder / "again"));
   ASSERT_FALSE(kept.empty());
-  EXPECT_EQ(kept.size(), events.size() / 10 * 10);  // of groups of ten
+  EXPECT_EQ(kept.size(), events.size() / 10 * 10);  // a group has ten events
   EXPECT_TRUE(std::equal(kept.begin(), kept.end(), events.begin()));
   EXPECT_EQ(FoundAtOpening(ReadSite(folder / "again")), "");
 }
@@ -152,7 +153,7 @@ class ArchiveTest : public testing::Test {
   const Site site = MakeSite(folder / "hall", WalksOf({1}));
   const fs::path file = folder / "hall.tar.zst";
 
-  // Refused, and nothing is left of it.
+  // Expects that the archive is refused and that no files are left; returns the message.
   std::string Refused() const {
     std::string why = WhyNot([&] { Restore(file, folder / "again"); });
     for (const auto& entry : fs::directory_iterator(folder)) {

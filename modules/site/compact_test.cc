@@ -17,7 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 using testing::HasSubstr;
 
-// With repeats of all kinds among them, and options that newer ones replace.
+// Events with repeats of all kinds, and with options that newer ones replace.
 std::vector<StoredEvent> Wasteful() {
   std::vector<StoredEvent> events{OptionsEvent("fusion", "a: 1"), OptionsEvent("fusion", "a: 2")};
   for (const StoredEvent& event : WalksOf({1})) {
@@ -100,7 +100,7 @@ TEST(Compact, HasNothingToDoWithoutAJournal) {
   EXPECT_FALSE(fs::exists(site.journal()));
 }
 
-// kill -9 when a step is reached for the n-th time.
+// Kills the compaction (kill -9) when it reaches a step for the n-th time.
 void CompactKilledAt(const Site& site, const std::optional<ThinJournal>& thin, CompactStep step,
                      int nth) {
   const pid_t child = fork();
@@ -118,7 +118,7 @@ void CompactKilledAt(const Site& site, const std::optional<ThinJournal>& thin, C
   ASSERT_TRUE(WIFSIGNALED(status)) << "the step was not reached";
 }
 
-// Wherever it is killed.
+// After each kill the journal must be either the old or the new one.
 void ExpectOldOrNew(const std::vector<StoredEvent>& before, const std::vector<StoredEvent>& after,
                     const std::optional<ThinJournal>& thin) {
   const int num_written = static_cast<int>(after.size());
@@ -137,7 +137,7 @@ void ExpectOldOrNew(const std::vector<StoredEvent>& before, const std::vector<St
     EXPECT_EQ(EventsOf(site), swapped ? after : before) << static_cast<int>(step);
     EXPECT_EQ(FoundAtOpening(site), "");
     if (!swapped) {
-      Compact(site, thin);  // what was left over is no obstacle
+      Compact(site, thin);  // files left by the killed run are no obstacle
       EXPECT_EQ(EventsOf(site), after);
     }
     EXPECT_FALSE(fs::exists(site.folder / "journal.lcm.compacting"));

@@ -42,13 +42,13 @@ TEST_F(MergeTest, HasAllOfTheFirstAndBehindItTheSecondsKeyframes) {
   ASSERT_EQ(merged.size(), of_first.size() + 31);
   EXPECT_TRUE(std::equal(of_first.begin(), of_first.end(), merged.begin()));
   EXPECT_EQ(Count(merged, "KEYFRAME_2"), 31);
-  // Both walks were captured at once, and times do not step back.
+  // Both walks were captured at the same time, and times must not decrease.
   EXPECT_TRUE(std::ranges::is_sorted(merged, {}, &StoredEvent::utime));
   EXPECT_EQ(FoundAtOpening(ReadSite(out)), "");
   EXPECT_EQ(ReadSite(out).description.name, "both");
 }
 
-// What the server makes of it: the maps overlap, and become one group.
+// With both walks the server finds that the maps overlap, and makes them one group.
 TEST_F(MergeTest, TheServerFusesTheMapsOfBoth) {
   MergeSites(first, second, out, {});
   Progress progress("test");
@@ -68,7 +68,7 @@ TEST_F(MergeTest, NeedsTwoSites) {
 
 TEST_F(MergeTest, NumbersAnchorEditsOn) {
   const Site a = MakeSite(folder / "a", {EditEvent({1, 7}, 1, 0), EditEvent({1, 7}, 2, 1)});
-  // Of one revision by two agents both count.
+  // Edits with one revision by two agents are both kept.
   StoredEvent by_another = EditEvent({1, 7}, 2, 6);
   anchor_edit_t message{};
   ASSERT_TRUE(DecodeMessage(by_another.data, &message));

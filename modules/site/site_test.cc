@@ -101,7 +101,7 @@ TEST(SiteLock, IsHeldByOneAndNamesIt) {
   EXPECT_THAT(WhyNot([&] { Delete(site, true); }), HasSubstr(named));
   ASSERT_EQ(write(end[1], &byte, 1), 1);
   waitpid(other, nullptr, 0);
-  EXPECT_FALSE(UserOf(site));  // it need not have tidied up
+  EXPECT_FALSE(UserOf(site));  // also if the other process did not release the lock itself
   EXPECT_NO_THROW(const SiteLock lock(site));
 }
 

@@ -68,7 +68,7 @@ TEST(ThinnedJournal, SaysNothingOfKeyframesThatWent) {
     num_keyframes += seqs.size();
   }
   EXPECT_EQ(matched.size(), num_keyframes) << "each has its match";
-  // A replay takes it: edges lead over the gaps.
+  // A replay accepts the journal: edges lead over the gaps.
   EXPECT_EQ(session::ReadKeyframeLog(site.journal()).size(), num_keyframes);
 }
 

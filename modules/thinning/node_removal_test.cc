@@ -17,7 +17,7 @@ class NodeRemovalTest : public ::testing::Test {
     return {normal(random_), normal(random_), normal(random_)};
   }
   Rigid3 RandomPose() { return {ExpSo3(RandomVector(0.5)), RandomVector(2)}; }
-  // Correlated, of some millimetres and milliradians.
+  // Correlated; the sigmas are some millimetres and milliradians.
   Matrix6d RandomCovariance() {
     Matrix6d A;
     std::normal_distribution<double> normal(0, 0.003);
@@ -26,7 +26,7 @@ class NodeRemovalTest : public ::testing::Test {
     }
     return A * A.transpose() + 1e-6 * Matrix6d::Identity();
   }
-  // As the poses say.
+  // The exact relative pose of the two.
   RelativePose Measure(const Rigid3& T_map_a, const Rigid3& T_map_b) {
     return {T_map_a.Inverse() * T_map_b, RandomCovariance()};
   }

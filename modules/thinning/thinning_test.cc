@@ -82,7 +82,7 @@ class ThinningTest : public ::testing::Test {
     all.insert(all.end(), thinned.derived.begin(), thinned.derived.end());
     return all;
   }
-  // The pose graph's solution of it.
+  // The pose graph's solution for this input.
   std::vector<MapState> States(const ThinnedMaps& thinned) const {
     PoseGraph graph({});
     for (const Keyframe& keyframe : Staying(thinned)) {
@@ -101,7 +101,7 @@ class ThinningTest : public ::testing::Test {
     size_t groups = 0;
     double ate_m = 0;
   };
-  // And the ATE of the keyframes that are in `of` too.
+  // With the ATE of the keyframes that stay in `of`.
   SolvedMaps Solved(const ThinnedMaps& thinned, const ThinnedMaps& of) const {
     const std::vector<MapState> states = States(thinned);
     std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> positions;  // of the map, the truth
@@ -202,7 +202,7 @@ TEST_F(ThinningTest, AKeyframeGetsOnlySoManyDerivedConstraints) {
     beyond += std::max(0, derived - options.max_derived);
   }
   EXPECT_FALSE(count.empty());
-  // One for each map that would otherwise have none.
+  // Each map that would otherwise have no constraint may have one beyond the limit.
   EXPECT_LT(beyond, 2 * kVisits);
 }
 
@@ -243,7 +243,7 @@ TEST_F(ThinningTest, WhatPlacesAnAnchorStays) {
     EXPECT_EQ(after.holds[i].T_body_anchor.t, before.holds[i].T_body_anchor.t);
   }
   EXPECT_EQ(after.covariance, before.covariance);
-  // In the map it stays too, within what was known of its place.
+  // The anchor also keeps its position in the map, within its placement's uncertainty.
   const auto in_map = [&](const ThinnedMaps& of) {
     return PoseIn(States(of), {map, before.holds[0].seq}) * before.holds[0].T_body_anchor.t;
   };
@@ -252,7 +252,7 @@ TEST_F(ThinningTest, WhatPlacesAnAnchorStays) {
 }
 
 TEST_F(ThinningTest, EvidenceBetweenMapsThatAreNotFusedStays) {
-  // The second visit has one constraint, which fuses nothing.
+  // The second visit has one constraint, which is not enough for a fusion.
   const MapId alone = world_.agents[1].map;
   Constraint evidence;
   std::erase_if(constraints_, [&](const Constraint& constraint) {

@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kDepth_m = 5;
 
-// A walk along x, a metre between views, which look along y.
+// A walk along x with a view per metre; the views look along y.
 MapViews Walk(double from_m, int count, int group = 0) {
   MapViews map;
   map.group = group;
@@ -66,11 +66,11 @@ TEST(ViewCoverage, WhatWasNeverRecognisedHasNoAppearanceOfItsOwn) {
 
 TEST(ViewCoverage, WhatNoNewerMapShowsStays) {
   std::vector<MapViews> maps(3, Walk(0, 30));
-  maps.push_back(Walk(15, 30));  // half of it beyond
+  maps.push_back(Walk(15, 30));  // half of this walk is beyond the others
   maps.push_back(Walk(0, 30, 1));
   const auto kept = ChooseViews(maps, Always, {});
   EXPECT_EQ(NumKept(kept[2]), 0);
-  EXPECT_TRUE(kept[3][0]);   // leads over the gap
+  EXPECT_TRUE(kept[3][0]);   // needed to lead over the gap
   EXPECT_FALSE(kept[3][5]);  // at 20 m
   for (int i = 16; i < 30; ++i) {
     EXPECT_TRUE(kept[3][i]) << i;
@@ -89,7 +89,7 @@ TEST(ViewCoverage, ViewsThatLookElsewhereAreOthers) {
 TEST(ViewCoverage, StaysInRows) {
   std::vector<MapViews> maps(3, Walk(0, 40));
   maps[2].views[20].must_stay = true;
-  maps[2].views[28].must_stay = true;  // the gap between would be shorter than a row
+  maps[2].views[28].must_stay = true;  // a gap between these two would be shorter than a row
   const auto kept = ChooseViews(maps, Always, {});
   std::vector<bool> expected(40, false);
   std::fill(expected.begin() + 16, expected.begin() + 29, true);
@@ -97,7 +97,7 @@ TEST(ViewCoverage, StaysInRows) {
   EXPECT_EQ(kept[2], expected);
 }
 
-// Visitors who begin and end anywhere, and walk and look a little otherwise each time.
+// Visitors start and end anywhere, and each time walk and look a little differently.
 TEST(ViewCoverage, WhatStaysOfOneHallDoesNotGrowWithVisits) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> start_m(0, 20);

@@ -1,4 +1,4 @@
-// The process with live sensors on its bus.
+// Tests the process with live sensors on its bus.
 
 #include <gtest/gtest.h>
 
@@ -60,7 +60,7 @@ class VioLiveTest : public VioProcessTest {
       PublishMessage(bus == nullptr ? bus_ : *bus, "IMAGE_7", chunk);
     }
   }
-  // From `from` to before `to`; no images where `image` is empty.
+  // From `from` to before `to`; without images if `image` is empty.
   void PlayLive(int64_t from, int64_t to, const cv::Mat& image, LocalBus* bus = nullptr) {
     for (int64_t utime = from; utime < to; utime += kImuStep_us) {
       PublishImu(utime, bus);
@@ -150,7 +150,7 @@ TEST_F(VioLiveTest, ALiveOdometryThatCannotKeepUpDropsImagesAndSaysSo) {
       PublishMessage(bus, "IMU_7", message);
     }
     bus.Drain();
-    if (i % 3 == 2) {  // it does a third of them
+    if (i % 3 == 2) {  // the odometry handles only every third image
       bus.Work();
       worst_lag_us = std::max(worst_lag_us, utime - poses.back().utime);
     }
@@ -172,7 +172,7 @@ TEST_F(VioLiveTest, ALiveOdometryThatCannotKeepUpDropsImagesAndSaysSo) {
   EXPECT_NE(status_.summary.find("; lag 1.0 s, " + dropped + " images dropped"), std::string::npos)
       << status_.summary;
 
-  for (int i = 0; i < kImages; ++i) {  // now it keeps up
+  for (int i = 0; i < kImages; ++i) {  // now the odometry handles each image
     bus.Work();
   }
   process.Tick(2'000'000);

@@ -31,7 +31,7 @@ std::set<int32_t> LandmarksOf(const Keyframe& keyframe) {
   return ids;
 }
 
-// A hundred and more, each once, before the corners that were not tracked.
+// Tracked corners, more than a hundred and each once, come before those that were not tracked.
 void ExpectTrackedCornersFirst(const Keyframe& keyframe) {
   const size_t tracked = LandmarksOf(keyframe).size();
   EXPECT_GE(tracked, 100u);
@@ -41,7 +41,7 @@ void ExpectTrackedCornersFirst(const Keyframe& keyframe) {
   }
 }
 
-// Landmarks of the first that the second sees too.
+// Number of landmarks of the first that the second sees too.
 size_t SharedLandmarks(const Keyframe& first, const Keyframe& second) {
   const std::set<int32_t> a = LandmarksOf(first), b = LandmarksOf(second);
   return static_cast<size_t>(
@@ -72,7 +72,7 @@ TEST_F(VioProcessTest, SaysThatTheScaleIsNotKnown) {
   }
 }
 
-// Its keyframes state it too; one with too few depths repeats the previous value.
+// The keyframes state the sigma too; one with too few depths repeats the previous value.
 TEST_F(VioProcessTest, EachKeyframeSaysHowWellItKnowsTheScale) {
   for (const double drive_mps : {0.0, 1.5}) {
     keyframes_.clear();

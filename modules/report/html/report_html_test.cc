@@ -1,5 +1,5 @@
-// report.html: a page that parses, has every section, needs nothing else, and shows texts as they
-// are; and the charts and tables that only it has.
+// Tests report.html: the page parses, has every section, needs no other file, and shows texts
+// literally. Also tests the charts and tables that only this page has.
 
 #include "report/html/report_html.h"
 
@@ -197,7 +197,7 @@ TEST(ReportPaper, SequencesAreKnownByTheirFolder) {
   EXPECT_EQ(SequenceOf("/"), std::nullopt);
 }
 
-// Two agents in one map; `duration_s` as their recordings were played.
+// Metrics of two agents in one map; `duration_s`: the played part of their recordings.
 ReportMetrics Played(const std::string& first, const std::string& second,
                      std::optional<double> duration_s) {
   ReportMetrics metrics = MetricsOfTwoAgents();

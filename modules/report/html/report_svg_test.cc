@@ -1,4 +1,4 @@
-// Charts of report.html: where the drawing puts a value is where its axes say, whatever the plot.
+// Tests charts of report.html: a value is drawn at the place that the axes give it, in every plot.
 
 #include "report/html/report_svg.h"
 
@@ -80,7 +80,7 @@ TEST(ReportSvg, ValuesCanBeReadBack) {
   ASSERT_THAT(drawn.stretches, SizeIs(1));
   ASSERT_THAT(drawn.stretches[0], SizeIs(2));
   for (const size_t i : {0, 1}) {
-    // The drawing's hundredth of a unit, in 900 units of 50 s and some hundreds of 0.4 m.
+    // Drawn positions are rounded to 0.01 units; 50 s are 900 units, and 0.4 m are some hundreds.
     EXPECT_NEAR(drawn.stretches[0][i].x(), plot.lines[0].points[i].x(), 5e-4);
     EXPECT_NEAR(drawn.stretches[0][i].y(), plot.lines[0].points[i].y(), 1e-5);
   }

@@ -1,5 +1,5 @@
-// Two agents with exact odometry, fused at a known time, and anchors that the second shows off by a
-// known amount.
+// Two agents with exact odometry are fused at a known time; the second one shows anchors with a
+// known error.
 
 #include "report/metrics/report_anchors.h"
 
@@ -27,7 +27,7 @@ const Eigen::Vector3d kPlace{2, 0.3, 5};  // in the ground truth's frame
 int64_t Sensor(double s) { return kSensor + std::llround(1e6 * s); }
 int64_t Wall(double s) { return kWall + std::llround(1e6 * s); }
 
-// Their cameras look along z, on either side of the place.
+// The cameras look along z, from either side of the place.
 Rigid3 Truth(int32_t agent, double s) {
   return {YawRotation(0.02 * s * agent), {0.1 * s, 0.2 * agent, 0.02 * std::sin(s)}};
 }
@@ -87,14 +87,14 @@ struct World {
     Hear(1, revision, s + 1, p_truth);
   }
 
-  // ANCHOR_k.
+  // Adds an ANCHOR_k message.
   void Hear(int32_t agent, int64_t revision, double s, const Eigen::Vector3d& p_truth) {
     Rigid3 T_odom_anchor;
     T_odom_anchor.t = OdomFromTruth(agent) * p_truth;
     tracks[agent].heard[kKettle].push_back({Wall(s), revision, false, kMaps[agent], T_odom_anchor});
   }
 
-  // SHOWN_ANCHORS_k, a new one for each frame; `offset` in the ground truth's axes.
+  // Adds SHOWN_ANCHORS_k, a new one for each frame; `offset` is in the ground truth's axes.
   void Show(int32_t agent, int64_t revision, double from_s, double to_s, const Offset& offset,
             const Eigen::Vector3d& place = kPlace) {
     for (int i = 0; i <= 800; ++i) {
@@ -117,7 +117,7 @@ struct World {
     }
     return AnchorsOf(session, viewers, wanted);
   }
-  // Of the only anchor, at the only other agent of its group.
+  // The result for the only anchor, at the only other agent of its group.
   AnchorAtAgent AtSecond() const {
     const auto all = All();
     EXPECT_EQ(all.size(), 1u);
@@ -139,7 +139,7 @@ TEST(ReportAnchors, WhatIsShownWhereItIsHasNoError) {
   EXPECT_TRUE(kettle.placed);
   const AnchorAtAgent at = world.AtSecond();
   EXPECT_EQ(at.reason, "");
-  // The truth is interpolated, by 1e-5 m at this speed of rotation.
+  // The truth is interpolated, with an error of 1e-5 m at this rotation rate.
   for (const auto& error : {at.error_m, at.error_at_fusion_m, at.error_10s_m, at.error_end_m,
                             at.error_max_m, at.error_unblended_m}) {
     EXPECT_LT(error.value(), 2e-5);
@@ -157,14 +157,15 @@ TEST(ReportAnchors, AKnownOffsetIsTheError) {
   EXPECT_NEAR(*at.error_m, 0.03, 2e-5);
   EXPECT_NEAR(*at.error_max_m, 0.03, 2e-5);
   EXPECT_NEAR(*at.error_unblended_m, 0.01, 2e-5);
-  // Focal length 800 at 1280 wide, 5 m away.
+  // The focal length is 800 px for an image 1280 px wide; the anchor is 5 m away.
   EXPECT_NEAR(*at.error_px, 0.03 * 800 / 5 / 2, 0.02);
 }
 
 TEST(ReportAnchors, OnlyWhatIsShownTenSecondsAfterTheFusionCounts) {
   World world;
   world.Place(1, kPlaced_s, kPlace);
-  // 0.4 m at first, 0.04 m from the eleventh second on, 0.05 m in the last.
+  // 0.4 m at first, 0.02 m ten seconds after the fusion, then 0.04 m, and 0.05 m in the last
+  // second.
   world.Show(2, 1, kShown_s, kEnd_s, [](double s) -> Eigen::Vector3d {
     return Eigen::Vector3d::UnitX() * (s < 19.99 ? 0.4 : s < 20.01 ? 0.02 : s < 39 ? 0.04 : 0.05);
   });

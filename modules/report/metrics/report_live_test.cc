@@ -17,8 +17,9 @@ Rigid3 Truth(int i) {
   return {ExpSo3({0.1 * std::sin(s), 0, 0.3 * s}), {3 * std::cos(0.3 * s), 2 * std::sin(s), 0}};
 }
 
-// 20 s: raw odometry of 5 % too small a scale; from second 5 on corrected in its own frame, from
-// second 10 on in the older map's, exact but for `error` in x of every other second.
+// Poses of 20 s. The raw odometry has 5 % too small a scale. From second 5 on the poses have a
+// correction in the map's own frame; from second 10 on they are exact in the older map's frame, but
+// for +-`error` in x, of alternating sign from second to second.
 struct Shown {
   std::vector<LivePose> poses;
   Trajectory ground_truth;
@@ -52,7 +53,7 @@ TEST(LiveMetrics, TheErrorIsThatOfWhatWasShownSinceTheFusion) {
 TEST(LiveMetrics, WithoutAFusionTheFirstCorrectionBegins) {
   const Shown shown(0);
   const LiveMetrics metrics = LiveMetricsOf(shown.poses, {}, shown.ground_truth);
-  // A quarter to a half of the stretch is shown as the raw odometry, in a frame of its own.
+  // A third of the time since the first correction shows the raw odometry, in a frame of its own.
   EXPECT_GT(*metrics.ate_m, 0.01);
   EXPECT_LT(*metrics.ate_m, *metrics.ate_raw_m);
 }

@@ -12,7 +12,7 @@ namespace {
 const MapId kFirst{1, 100};
 const MapId kSecond{2, 200};
 
-// Correlated, metres to centimetres and degrees to tenths.
+// Correlated; sigmas from metres to centimetres, and from degrees to tenths of a degree.
 Matrix6d SomeCovariance() {
   Matrix6d root = Matrix6d::Zero();
   root.diagonal() << 0.05, 0.02, 0.03, 0.004, 0.006, 0.008;
@@ -27,7 +27,7 @@ Rigid3 TruePose(int i) {
   return {ExpSo3({0.02 * i, 0.3 * std::sin(i), 0.1 * i}), {0.1 * i, std::cos(0.2 * i), 1}};
 }
 
-// `scale` on the sigmas of the noise, against those the covariance tells.
+// `scale`: sigmas of the noise, relative to those of the stated covariance.
 std::vector<ConstraintWithTruth> Noisy(int count, double scale) {
   std::mt19937 random(7);
   std::normal_distribution<double> normal;

@@ -1,4 +1,5 @@
-// Anchors of a session file on an agent's bus, and which image of its recording they mean.
+// Tests anchors of a session file: the requests on an agent's bus, and the choice of the image of
+// the recording.
 
 #include "session/anchors/anchor_app.h"
 

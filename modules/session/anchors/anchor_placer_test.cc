@@ -1,4 +1,4 @@
-// When an anchor is requested, with what, and when no more.
+// Tests when an anchor is requested, the request's contents, and when requests end.
 
 #include "session/anchors/anchor_placer.h"
 

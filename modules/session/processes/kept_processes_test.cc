@@ -16,7 +16,7 @@ using testing::HasSubstr;
 
 class KeptProcessesTest : public testing::Test {
  protected:
-  // Until one has ended and was started again.
+  // Waits until a process has ended and was started again.
   KeptProcesses::Revived NextRevived() {
     for (int i = 0; i < 1000; ++i) {
       const std::vector<KeptProcesses::Revived> revived = kept_.Revive();
@@ -82,7 +82,7 @@ TEST(QuickDeaths, AreInARowAndOfOneReason) {
   QuickDeaths deaths;
   EXPECT_FALSE(deaths.Note("a", 1));
   EXPECT_FALSE(deaths.Note("a", 1));
-  EXPECT_FALSE(deaths.Note("a", 11));  // it ran
+  EXPECT_FALSE(deaths.Note("a", 11));  // a long run before its death
   EXPECT_FALSE(deaths.Note("a", 1));
   EXPECT_FALSE(deaths.Note("b", 1));
   EXPECT_FALSE(deaths.Note("a", 1));
@@ -100,7 +100,7 @@ TEST_F(KeptProcessesTest, AChildHasNoneOfItsParentsFiles) {
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
   close(leak);
-  EXPECT_EQ(child.LastLine(), "3");  // ls' own
+  EXPECT_EQ(child.LastLine(), "3");  // the descriptor of ls itself
 }
 
 }  // namespace

@@ -274,7 +274,7 @@ TEST_F(SessionFileTest, ErrorsNameTheMend) {
               testing::AllOf(HasSubstr("no.lcm"), HasSubstr("--out-keyframes")));
 }
 
-// An agent that never starts, a session that never ends.
+// Otherwise, for instance, an agent would never start or a session would never end.
 TEST_F(SessionFileTest, EveryNumberHasItsRange) {
   const std::string agent = "agents:\n  - {id: 1, recording: ../recordings/MH_02}\n";
   const auto refuses = [&](const std::string& text, const std::string& key,

@@ -15,7 +15,7 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 
-// The sessions of the repository are as the schema has them.
+// The repository's sessions conform to the schema.
 TEST(SessionList, EveryShippedSessionParses) {
   const std::vector<fs::path> files = SessionFiles(fs::path(PANGEA_SOURCE_DIR) / "sessions");
   EXPECT_GE(files.size(), 23u);
@@ -24,7 +24,7 @@ TEST(SessionList, EveryShippedSessionParses) {
   }
 }
 
-// The page that explains the keys is as the schema has them.
+// The example on the page that explains the keys conforms to the schema.
 TEST(SessionList, TheExampleOfTheDocumentationParses) {
   std::ifstream page(fs::path(PANGEA_SOURCE_DIR) / "docs" / "sessions.md");
   const fs::path file = fs::path(testing::TempDir()) / "documented.yaml";

@@ -1,4 +1,4 @@
-// Spline, steps, generated paths and the IMU made from them.
+// Tests the spline, steps, generated paths and their IMU samples.
 
 #include <gtest/gtest.h>
 
@@ -76,8 +76,8 @@ TEST(PathSteps, AStepIsFoundAndSpread) {
   for (size_t i = 1; i < spread.size(); ++i) {
     largest = std::max(largest, (spread[i].T.t - spread[i - 1].T.t).norm());
   }
-  EXPECT_LT(largest, 0.015);  // 5 ms at up to 2.2 m/s, and the jitter
-  // Away from the step nothing moves but by the whole step.
+  EXPECT_LT(largest, 0.015);  // 5 ms at up to 2.2 m/s, plus the jitter
+  // Far from the step both paths are equal.
   EXPECT_LT((spread[700].T.t - stepped[700].T.t).norm(), 1e-9);
   EXPECT_LT((spread[1700].T.t - stepped[1700].T.t).norm(), 1e-9);
   const auto largest_acceleration = [](const Trajectory& trajectory) {

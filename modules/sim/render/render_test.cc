@@ -1,4 +1,4 @@
-// Textures, renderer, sensor, scenes and tracks.
+// Tests textures, renderer, sensor, scenes and tracks.
 
 #include <gtest/gtest.h>
 
@@ -22,7 +22,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-// Looks along +x of the reference, rotated by a small rotation of the camera.
+// A camera that looks along +x of the reference, with an additional small rotation.
 Rigid3 LookAlongX(const Vector3d& rotation, const Vector3d& at) {
   return {LookingAhead() * ExpSo3(rotation), at};
 }
@@ -38,7 +38,7 @@ cv::Mat Window(const cv::Mat& grey, const Vector2d& middle) {
   return window;
 }
 
-// Centre and variances of what is bright in the window, pixels of the whole image.
+// Centre and variances of the window's bright part, in pixels of the whole image.
 struct Blob {
   Vector2d centre = Vector2d::Zero();
   Vector2d variance = Vector2d::Zero();
@@ -215,7 +215,8 @@ TEST(Scene, StaysClearOfThePathsItIsBuiltAround) {
       EXPECT_LT(p[axis], scene.room_max[axis] - 0.5);
     }
     for (const Primitive& primitive : scene.primitives) {
-      // Points are thinned to cubes of 0.2 m before the check: up to 0.35 m nearer.
+      // Points are thinned to cubes of 0.2 m before the check, so a piece may be up to 0.35 m
+      // nearer.
       EXPECT_GT(primitive.Distance(p.cast<float>()), options.clearance_m - 0.35);
     }
   }
@@ -261,7 +262,7 @@ TEST(Scene, TwinRoomsShareADozenObjectsAtDifferentPlaces) {
       }
     }
   }
-  EXPECT_GE(shared, 20);  // two parts each; one of the dozen may find no room
+  EXPECT_GE(shared, 20);  // each has two parts; one of the dozen may find no place
 }
 
 TEST(Scene, HallsWithRowsRepeatTheSameMachinesWithinAndAcross) {
@@ -279,7 +280,7 @@ TEST(Scene, HallsWithRowsRepeatTheSameMachinesWithinAndAcross) {
 }
 
 TEST(Scene, ABareHallHasAFractionOfTheMarks) {
-  // The mean step of grey over 3 cm of the room's own sheets.
+  // The mean change of grey over 3 cm on the room's own sheets.
   const auto roughness = [](SceneKind kind) {
     const Scene scene = BuildScene(CoarseScene(kind, 1));
     double sum = 0;

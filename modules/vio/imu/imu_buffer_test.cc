@@ -28,7 +28,7 @@ TEST(ImuBuffer, IntegratesExactlyTheSpan) {
   const Preintegration whole =
       buffer.Integrate(kFirst_us + 12'000, kFirst_us + 93'000, {}, bg, ba).measured;
   EXPECT_NEAR(whole.duration_s, 0.081, 1e-12);
-  // Two parts make the whole.
+  // Integrated in two parts, the result is the same.
   const Preintegration a =
       buffer.Integrate(kFirst_us + 12'000, kFirst_us + 50'000, {}, bg, ba).measured;
   const Preintegration b =
@@ -37,7 +37,7 @@ TEST(ImuBuffer, IntegratesExactlyTheSpan) {
   EXPECT_LT(LogSo3((a.delta_q * b.delta_q).conjugate() * whole.delta_q).norm(), 1e-9);
 }
 
-// A hand that starts to rotate: the rate grows during the read-out.
+// A hand starts to rotate: the rotation rate grows during the read-out.
 TEST(ImuBuffer, MotionMeetsTheRotationsOfTheMiddleAndTheEnd) {
   constexpr double kReadout_s = 0.03;
   const Vector3d omega(0.2, -0.4, 0.1), alpha(15, -8, 4), bias(0.01, 0.02, -0.01);
@@ -58,7 +58,7 @@ TEST(ImuBuffer, MotionMeetsTheRotationsOfTheMiddleAndTheEnd) {
   const BodyMotion motion = buffer.MotionFrom(kFirst_us + 10'000, kReadout_s, {}, state);
   EXPECT_LT((motion.omega - (omega + 0.01 * alpha)).norm(), 1e-3);
   EXPECT_LT((motion.alpha - alpha).norm(), 0.1);
-  EXPECT_LT((motion.a - a).norm(), 0.2);  // the force turns with the body
+  EXPECT_LT((motion.a - a).norm(), 0.2);  // the specific force rotates with the body
   for (const double share : {0.5, 1.0}) {
     const auto moved = buffer.Integrate(kFirst_us + 10'000,
                                         kFirst_us + 10'000 + std::llround(1e6 * share * kReadout_s),
@@ -76,7 +76,7 @@ TEST(ImuBuffer, MotionOfAGlobalShutterIsTheRotationRate) {
   EXPECT_EQ(motion.a, Vector3d::Zero());
 }
 
-// Exact if the axis of the rotation is constant.
+// Exact, as the axis of the rotation is constant.
 TEST(BodyMotion, BegunLaterItIsTheSame) {
   const Vector3d axis(0.6, -0.8, 0);
   const BodyMotion motion{2 * axis, 15 * axis, {0.8, -0.3, 0.5}, {2, 1, -3}};

@@ -25,8 +25,8 @@ struct Ride {
   int landmarks = 100;
   Vector3d omega = Vector3d::Zero();       // of the body, rad/s
   Vector3d v = Vector3d::Zero();           // m/s
-  Vector3d seen_omega = Vector3d::Zero();  // what the gyro reads besides
-  Vector3d gyro_bias = Vector3d::Zero();   // what the estimator takes it to be
+  Vector3d seen_omega = Vector3d::Zero();  // added to the gyro's reading
+  Vector3d gyro_bias = Vector3d::Zero();   // gyro bias that the estimator assumes
   double accel_sigma = 0.03;               // m/s^2, each axis
   StationaryOptions options = {};
 };
@@ -58,7 +58,7 @@ TrackedFrame FrameAt(const Ride& ride, const CameraModel& camera, double t,
   return frame;
 }
 
-// `shift_sigmas`: the same at each frame.
+// `shift_sigmas`: if given, every frame has this shift.
 Said Watch(const Ride& ride, std::optional<double> shift_sigmas = std::nullopt) {
   std::mt19937_64 rng(1);
   std::uniform_real_distribution<double> uniform(-1, 1);

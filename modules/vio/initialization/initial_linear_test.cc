@@ -1,4 +1,4 @@
-// Gyro bias, time offset and the closed-form start.
+// Tests the gyro bias, the time offset and the closed-form start.
 
 #include <gtest/gtest.h>
 

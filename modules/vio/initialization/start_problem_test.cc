@@ -1,4 +1,4 @@
-// The start's bundle adjustment: derivatives, covariance, and results.
+// Tests the start's bundle adjustment: derivatives, covariance, and results.
 
 #include "vio/initialization/start_problem.h"
 
@@ -91,7 +91,7 @@ MatrixXd HessianOf(const StartProblem& problem) {
 class StartProblemTest : public ::testing::TestWithParam<double> {};
 INSTANTIATE_TEST_SUITE_P(StampSigmas, StartProblemTest, ::testing::Values(0, 0.002));
 
-// With the points where they are; some rays are beyond Huber's bound.
+// With fixed points; some rays are beyond Huber's threshold.
 TEST_P(StartProblemTest, GradientMatchesDifferencesOfTheCost) {
   const double stamp_sigma_s = GetParam();
   const StartProblem exact = ExactProblem(stamp_sigma_s);
@@ -105,7 +105,7 @@ TEST_P(StartProblemTest, GradientMatchesDifferencesOfTheCost) {
                  moved.points = problem.points;
                  return VectorXd::Constant(1, moved.Cost()).eval();
                }).transpose();
-  // Eliminated: g + gain^T g_point.
+  // After elimination the gradient is g + gain^T g_point.
   for (int k = 0; k < kPoints; ++k) {
     const VectorXd g_point = NumericJacobian(3, 1e-6, [&](const VectorXd& step) {
                                StartProblem moved = problem;

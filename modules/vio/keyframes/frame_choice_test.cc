@@ -19,7 +19,7 @@ struct Pair {
   WindowState state;
   TrackHistory history;
 
-  // Every landmark is seen at its place plus `shift_px`; the first `tracks` of them.
+  // Adds a frame that sees the first `tracks` landmarks, each displaced by `shift_px`.
   WindowFrame& Add(double at_s, double shift_px, int tracks) {
     WindowFrame frame;
     frame.utime = kFirstFrame_us + std::llround(1e6 * at_s);
@@ -70,8 +70,8 @@ TEST(FrameChoice, AKeyframeWantsMoreAndATimeApart) {
 TEST(FrameChoice, RotationIsTakenOut) {
   Pair pair;
   WindowFrame& frame = pair.Add(0.3, 30, kFrameTracks);
-  // The camera looks along the body's z axis here: about its y axis the rays near the middle shift
-  // alike.
+  // The camera looks along the body's z axis here: a rotation about y shifts the rays near the
+  // middle equally.
   frame.imu.T_odom_body.q = ExpSo3({0, -30 * pair.camera.PixelAngle(), 0});
   pair.choice.Choose(pair.history, &pair.state);
   EXPECT_FALSE(pair.state.frames[1].is_window_keyframe);

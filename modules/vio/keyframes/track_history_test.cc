@@ -33,7 +33,7 @@ TEST(TrackHistory, RaysFollowTheIntrinsics) {
             return changed.Calibrated(camera).Unproject(pixel).value();
           });
       EXPECT_LT((seen.J_intrinsics - numeric).cwiseAbs().maxCoeff(), 1e-6);
-      // Half a per cent is still small, also in a distorted corner.
+      // A change by half a per cent is still small, also in a distorted corner.
       WindowState state;
       state.intrinsics << 0.005, -0.0025, 0.0025, 0.002, -0.002;
       const Vector2d exact = state.Calibrated(camera).Unproject(pixel).value();

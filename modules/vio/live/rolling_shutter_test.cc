@@ -57,7 +57,7 @@ TEST(RollingShutter, WhatRowsSawLandsWhereTheFirstRowWouldHaveSeenIt) {
     if (!still || !seen || !camera.Contains(*still, 2) || !camera.Contains(*seen, 2)) {
       continue;
     }
-    // The depth the row's camera measured.
+    // The depth is that from the row's camera.
     const double s = camera.readout_s * seen->y() / (camera.height - 1);
     const Vector3d p_row =
         (motion.After(s) * camera.T_body_cam).Inverse() * (camera.T_body_cam * p_cam);
@@ -69,7 +69,7 @@ TEST(RollingShutter, WhatRowsSawLandsWhereTheFirstRowWouldHaveSeenIt) {
     shift = std::max(shift, (*still - *seen).norm());
   }
   CompensateRollingShutter(motion, keyframe);
-  ASSERT_GT(shift, 5);  // there was something to take out
+  ASSERT_GT(shift, 5);  // the correction has something to remove
   for (size_t i = 0; i < expected.size(); ++i) {
     EXPECT_LT((keyframe.corners[i].pixel.cast<double>() - expected[i]).norm(), 0.01) << i;
   }

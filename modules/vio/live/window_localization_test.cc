@@ -93,7 +93,7 @@ class World {
       const Vector3d truth(Uniform(25, 29), Uniform(1, 8), Uniform(-1, 4));
       const Vector3d c = sources_[landmark.source];
       const Vector4d& off = source_errors_[landmark.source];
-      // truth = c + Rz(yaw) (p - c) + shift, and the point itself is off.
+      // truth = c + Rz(yaw) (p - c) + shift; the point has an error of its own, too.
       const Vector3d along = (truth - c).normalized();
       landmark.covariance = 1e-5 * Matrix3d::Identity() + 4e-4 * along * along.transpose();
       const Eigen::LLT<Matrix3d> root(landmark.covariance);
@@ -262,7 +262,7 @@ TEST(WindowLocalization, LandmarksThatContradictTheCorrectionAreNotBelieved) {
   world.MakeEstimate(options);
   world.SeeLandmarks(40);
   for (SeenLandmark& landmark : world.landmarks_) {
-    landmark.p_map += Vector3d(0, 0.15, 0.1);  // all of them, alike
+    landmark.p_map += Vector3d(0, 0.15, 0.1);  // all by the same step
   }
   EXPECT_FALSE(world.Localize(options));
 }

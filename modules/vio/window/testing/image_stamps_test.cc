@@ -58,7 +58,7 @@ TEST(ImageStamps, JitterIsNoLongerInterval) {
 }
 
 TEST(ImageStamps, WhereTheIntervalChangesTheExposureIsUnknown) {
-  // Uniform over half an interval, in either direction or not at all.
+  // A uniform distribution over half an interval.
   EXPECT_NEAR(Taken(0.03, 25, SlowerAfter20).sigma_s(), 0.03 / std::sqrt(12), 1e-9);
   EXPECT_EQ(Taken(0.03, 20, SlowerAfter20).sigma_s(), 0);  // it has not changed yet
   EXPECT_EQ(Taken(0, 25, SlowerAfter20).sigma_s(), 0);     // a global shutter
