@@ -1,4 +1,4 @@
-// Which agent's keyframes come first: both orders give one map.
+// Tests that the map does not depend on whose keyframes come first.
 
 #include <gtest/gtest.h>
 
@@ -42,8 +42,8 @@ TEST(ArrivalOrder, OneMap) {
         constraints["accepted"].get<int>() + constraints["refused_by_reason"].value("redundant", 0),
         30);
   }
-  // The two map frames are those of different agents: one rotation and step for all keyframes is
-  // free.
+  // The map frames of both replays are those of different agents, so one rotation and translation
+  // of all keyframes is free.
   std::vector<std::vector<PosePair>> agents;
   for (const char* name : {"agent_1.tum", "agent_2.tum"}) {
     agents.push_back(Associate(ReadTum((outs[0] / name).string(), nullptr),

@@ -1,5 +1,5 @@
-// Captured keyframes through real processes over bad links: nothing is lost, and the map is the one
-// that the same keyframes give without any link.
+// Tests captured keyframes through real processes over bad links: nothing is lost, and the map is
+// the same as without any link.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ constexpr double kTolerance_m = 0.005;
 
 fs::path Sample() { return fs::path(PANGEA_SOURCE_DIR) / "logs" / "two_walks"; }
 
-// What a log has of OPTIONS_*.
+// The contents of a log's OPTIONS_*.
 std::string Options(const fs::path& log) {
   return RunCommand("pangea-log list " + log.string() + " --fields --channels 'OPTIONS_.*'").output;
 }
@@ -59,7 +59,7 @@ TEST(BadLink, ChangesNothing) {
     EXPECT_GT(up["reordered"].get<int>(), 2);
   }
   EXPECT_THAT(run.output, HasSubstr("loss 10 %"));
-  // What the link's processes ran with is in the logs.
+  // The logs contain the options with which the link's processes ran.
   EXPECT_THAT(Options(out / "agent_1.lcm"),
               AllOf(HasSubstr("packet_bytes: 1100"), HasSubstr("loss: 0.1")));
   EXPECT_THAT(Options(out / "agent_2.lcm"),

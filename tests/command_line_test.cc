@@ -1,4 +1,4 @@
-// What a shell sees of the programs: completion, the list of sessions, what is no argument.
+// Tests the programs as a shell sees them: completion, the list of sessions, wrong arguments.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -19,7 +19,7 @@ using testing::HasSubstr;
 using testing::IsSupersetOf;
 using testing::Not;
 
-// What bash offers behind these words; the last one, perhaps empty, is being typed.
+// The completions that bash offers after these words; the last one, perhaps empty, is being typed.
 std::vector<std::string> Complete(const std::vector<std::string>& words) {
   std::string quoted;
   for (const std::string& word : words) {
@@ -59,7 +59,7 @@ TEST(Completion, OffersSessionsAndTheirFiles) {
   EXPECT_THAT(Complete({"pangea-session", "run", "sessions/dem"}),
               ElementsAre("sessions/demo.yaml"));
   EXPECT_THAT(Complete({"pangea-session", "run", "--rate", ""}), Contains("max"));
-  // Anything else is a file: left to bash.
+  // For anything else bash completes file names itself.
   EXPECT_THAT(Complete({"pangea-session", "report", "logs/"}), ElementsAre());
   EXPECT_THAT(Complete({"pangea-session", "run", "--out", ""}), ElementsAre());
 }
@@ -74,7 +74,7 @@ TEST(SessionList, ShowsTheSessionsAtHand) {
   EXPECT_THAT(outcome.output, HasSubstr("demo\ntable2_MH_01\n"));
 }
 
-// An installed program without a folder of sessions at hand has those that came with it.
+// An installed program without a folder of sessions nearby uses the installed ones.
 TEST(SessionList, FindsTheInstalledSessions) {
   const fs::path folder = FreshFolder("installed_sessions");
   fs::create_directories(folder / "bin");
@@ -110,7 +110,7 @@ TEST(Log, WhatIsNoLogIsNoEmptyLog) {
   EXPECT_THAT(cost.output, HasSubstr("empty.lcm: has no VERTEX_SE3:QUAT"));
 }
 
-// What is printed may be what was asked for.
+// The output may be the result that the user needs, so its loss is an error.
 TEST(Output, AFullDiskIsSaid) {
   const std::string log = PANGEA_SOURCE_DIR "/logs/two_walks/session.lcm";
   for (const std::string& command : {"pangea-log info " + log, "pangea-log list --json " + log}) {
@@ -129,7 +129,7 @@ TEST(Numbers, AreFinite) {
   }
 }
 
-// So that `explain` and a replay find images and ground truth.
+// `explain` and a replay need them to find images and ground truth.
 TEST(Log, WhatIsMadeOfALogKeepsItsRecordings) {
   const fs::path folder = FreshFolder("log_recordings");
   const std::string whole = (folder / "whole" / "session.lcm").string();
@@ -150,7 +150,7 @@ TEST(Log, WhatIsMadeOfALogKeepsItsRecordings) {
     EXPECT_EQ(record["agents"][0]["start"], 1.5);
     EXPECT_TRUE(record["expect"].empty()) << "of the whole, not of a part";
   }
-  // One of the same name that knows no recordings has none.
+  // A log without recordings that replaces one of the same name must not inherit the other's.
   fs::remove(part);
   ASSERT_EQ(
       RunCommand("pangea-log cut " PANGEA_SOURCE_DIR "/logs/two_walks/session.lcm --to 4 --out " +
@@ -161,7 +161,7 @@ TEST(Log, WhatIsMadeOfALogKeepsItsRecordings) {
   fs::remove_all(folder);
 }
 
-// `--rate` is how quickly something is played, in every program that has it.
+// `--rate` is the speed of playing, in every program that has it.
 TEST(Uplink, BandwidthAndBudgetHaveOneUnit) {
   EXPECT_THAT(Complete({"pangea-uplink", "--b"}), ElementsAre("--bus", "--bandwidth", "--budget"));
   EXPECT_THAT(Complete({"pangea-uplink", "--ra"}), ElementsAre());
@@ -171,7 +171,7 @@ TEST(Uplink, BandwidthAndBudgetHaveOneUnit) {
   EXPECT_THAT(outcome.output, HasSubstr("the budget must be at least 5 kB/s"));
 }
 
-// Or what goes out on one comes in on it again.
+// Otherwise each sent packet would also be received on the same side.
 TEST(Link, ItsTwoSidesDiffer) {
   for (const char* command :
        {"pangea-link-emulator --agent 1 --bus x --agent-link u --server-link u",
@@ -184,7 +184,7 @@ TEST(Link, ItsTwoSidesDiffer) {
   }
 }
 
-// Not a report without ground truth, as if the recording had none.
+// Otherwise the report would lack ground truth, as if the recording had none.
 TEST(Session, ARecordingThatIsGivenIsThere) {
   const Outcome outcome =
       RunCommand("pangea-session replay " PANGEA_SOURCE_DIR
@@ -207,7 +207,7 @@ TEST(Eval, TheEstimateComesFirst) {
   EXPECT_THAT(outcome.output, HasSubstr("is a folder: give ESTIMATE first, then REFERENCE"));
 }
 
-// Nobody answers on this link.
+// No server answers on this link.
 TEST(Uplink, SaysWhatIsLostWithoutASpool) {
   const Outcome outcome = RunCommand(
       "(rm -rf lost && mkdir -m 700 lost && pangea-agent-handler keygen --agent 1 --out lost/key "

@@ -1,5 +1,5 @@
-// Damaged captures through every program that reads one: what can be read is read, what is lost is
-// said, and the exit code tells it.
+// Tests every program that reads logs with damaged captures: it must read what is readable, report
+// the loss, and show it by the exit code.
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -23,8 +23,8 @@ using testing::HasSubstr;
 using testing::Not;
 
 constexpr int kEvents = 629;
-constexpr size_t kConstraint = 314;  // a CONSTRAINT
-constexpr size_t kPose = 400;        // 4 kB from here reach into a KEYFRAME_2
+constexpr size_t kConstraint = 314;  // the index of a CONSTRAINT
+constexpr size_t kPose = 400;        // the index of a POSE; 4 kB from here reach into a KEYFRAME_2
 
 std::vector<LogPiece> Pieces(const std::string& log) {
   const int fd = open(log.c_str(), O_RDONLY | O_CLOEXEC);
@@ -60,7 +60,7 @@ class DamagedLog : public ::testing::Test {
   static void Write(const std::string& name, const std::string& bytes) {
     std::ofstream(*folder_ / name, std::ios::binary) << bytes;
   }
-  // In the folder of the damaged logs.
+  // Runs a command in the folder of the damaged logs.
   static Outcome Run(const std::string& command) {
     return RunCommand(fmt::format("cd {} && {}", folder_->string(), command));
   }
@@ -109,7 +109,7 @@ TEST_F(DamagedLog, WhatIsNoLogIsAnError) {
 }
 
 TEST_F(DamagedLog, EachToolReadsOnBehindTheDamage) {
-  // Of 629 events 314 stand before the damaged one: more lines than that come from behind it.
+  // Of 629 events 314 are before the damaged one, so more lines than that come from after it.
   Outcome outcome = Run("pangea-log list bit.lcm > list.txt");
   EXPECT_EQ(outcome.exit_code, kExitLost);
   EXPECT_THAT(outcome.output, HasSubstr(kBit));

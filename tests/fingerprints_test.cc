@@ -1,6 +1,6 @@
-// Every type's fingerprint, pinned: a type that a committed log contains is frozen, and a change
-// here must be meant. A changed type is a new file; only a type that never shipped may have its
-// number replaced.
+// Pins the fingerprint of every type: a type that a committed log contains is frozen, and a change
+// here must be intended. A changed type is a new file; only a type that was never released may have
+// its number replaced.
 
 #include <gtest/gtest.h>
 

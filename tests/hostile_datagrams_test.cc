@@ -1,5 +1,6 @@
-// Random and mutated datagrams, raw on the buses of running programs: they live, and do their work.
-// PANGEA_DATAGRAMS: how many (CMakeLists.txt: some by default, 10^6 among the slow tests).
+// Sends random and mutated raw datagrams on the buses of running programs: the programs must
+// survive and do their work. PANGEA_DATAGRAMS: their number (CMakeLists.txt: some by default, 10^6
+// among the slow tests).
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -37,7 +38,7 @@ int64_t NumDatagrams() {
   return given == nullptr ? 30'000 : std::atoll(given);
 }
 
-// What is said on a bus, as raw datagrams.
+// Receives the raw datagrams of a bus.
 class Ear {
  public:
   explicit Ear(const std::string& url)
@@ -58,7 +59,7 @@ class Ear {
   int fd_;
 };
 
-// Somebody without a key who has listened for a while.
+// An attacker without a key who has listened for a while.
 class Stranger {
  public:
   Stranger(const std::string& url, const std::string& channel, std::vector<Datagram> heard)
@@ -90,7 +91,7 @@ class Stranger {
     const std::string text = RandomText(1400);
     return rng_() % 2 == 0 ? ShortDatagram(text) : Datagram(text.begin(), text.end());
   }
-  // Of few messages, so that some of them come together.
+  // The fragments are of few messages, so that some of them fit together.
   Datagram RandomFragment() {
     const FragmentHeader header{static_cast<uint32_t>(rng_() % 4), RandomNumber(), RandomNumber(),
                                 static_cast<uint16_t>(rng_() % 3),
@@ -173,7 +174,7 @@ class HostileDatagrams : public testing::Test {
     }
     return false;
   }
-  // Whether keyframes go from the agent through both programs to the disk and are acknowledged.
+  // Whether keyframes pass from the agent through both programs to the disk and are acknowledged.
   bool Delivers(int64_t opened_utime) {
     constexpr int32_t kKeyframes = 10;
     const MapId map{kAgent, opened_utime};
@@ -185,7 +186,7 @@ class HostileDatagrams : public testing::Test {
       return found != journalled_.end() && found->second == kKeyframes - 1;
     });
   }
-  // Whether all programs say something new of themselves.
+  // Whether all programs publish a new status.
   bool AllAnswer() {
     statuses_.clear();
     return Wait([&] {

@@ -1,5 +1,5 @@
-// A capture's inputs, played by lcm-logplayer into server processes started by hand, give the map
-// that the capture replays to.
+// Tests that a capture's inputs, played by lcm-logplayer to server processes started by hand, give
+// the same map as the capture's replay.
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -16,15 +16,15 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kTolerance_m = 0.005;
-constexpr int kTries = 60;  // one a second, until the processes have worked everything off
+constexpr int kTries = 60;  // one per second, until the processes have finished their work
 
 std::string LoopbackUrl() {
-  // Below the ports that the kernel gives to sockets without one, as every LCM sender's is.
+  // Below the range from which the kernel gives ports to LCM's senders.
   return "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 12000) +
          "?ttl=0&recv_buf_size=4194304";
 }
 
-// The server functions and a logger, until the object goes.
+// The server processes and a logger, until the object is destroyed.
 class ServerByHand {
  public:
   ServerByHand(const std::string& url, const fs::path& folder) {

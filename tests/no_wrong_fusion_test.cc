@@ -1,5 +1,5 @@
-// What must never be one map: two different halls, and two rooms that share a dozen identical
-// objects standing at different places.
+// Tests places that must never become one map: two different halls, and two rooms that share a
+// dozen identical objects at different positions.
 
 #include <gtest/gtest.h>
 
@@ -17,7 +17,7 @@ void RenderWalk(const fs::path& out, const std::string& arguments) {
   ASSERT_EQ(rendered.exit_code, 0) << rendered.output;
 }
 
-// Nothing was fused: so it is also when nothing was mapped.
+// Without maps there would be no fusion either, so both agents must have one.
 void ExpectBothMapped(const nlohmann::json& report) {
   ASSERT_EQ(report["agents"].size(), 2u);
   for (const auto& agent : report["agents"]) {
@@ -26,7 +26,7 @@ void ExpectBothMapped(const nlohmann::json& report) {
   }
 }
 
-// `least_refused`: constraints, where places are taken for one another and the geometry says no.
+// `least_refused`: least number of constraints that recognition proposes and verification refuses.
 void ExpectApart(const std::string& name, const std::string& first, const std::string& second,
                  int least_refused) {
   const fs::path folder = FreshFolder(name);

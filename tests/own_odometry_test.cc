@@ -1,5 +1,5 @@
-// An odometry that is not ours as an agent: examples/own_odometry with ground-truth poses that
-// drift, and an agent of pangea-vio, become one map.
+// Tests an external odometry as an agent: examples/own_odometry with drifting ground-truth poses
+// and an agent of pangea-vio become one map.
 
 #include <gtest/gtest.h>
 
@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A random walk of position and yaw, and an odom frame of its own.
+// Adds a random walk of position and yaw, in an odom frame of its own.
 Trajectory Drifting(const Trajectory& truth) {
   std::mt19937_64 random(5);
   std::normal_distribution<double> normal;

@@ -1,5 +1,5 @@
-// `replay --from-checkpoint`: up to a time the log's matches and verification results count, then
-// they are made again.
+// Tests `replay --from-checkpoint`: until that time the log's matches and verification results are
+// used, after it they are computed again.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -25,7 +25,7 @@ using testing::HasSubstr;
 constexpr double kCheckpoint_s = 6;
 constexpr float kMark_px = 77;
 
-// A log with a mark in every match and verification result that changes nothing else of the map.
+// Marks every match and verification result of a log, without a change to anything else of the map.
 void WriteMarked(const std::string& log, const std::string& marked) {
   LogFileWriter out(marked);
   ReadLog(log, [&out](const LogEvent& event) {
@@ -80,7 +80,7 @@ MarksOf ReadMarks(const std::string& log) {
   return marks;
 }
 
-// The sample's replay, and that with marks, once for all tests of this file.
+// The sample's replay, and that of its marked copy, made once for all tests of this file.
 class ReplayCheckpoint : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -109,12 +109,12 @@ fs::path* ReplayCheckpoint::folder_ = nullptr;
 void ExpectMarkedUpToCheckpoint(const Marks& marks) {
   EXPECT_GT(marks.marked, 10);
   EXPECT_GT(marks.others, 10);
-  // To the next keyframe, which may be a second away.
+  // The next keyframe may be a second away.
   EXPECT_NEAR(marks.last_marked_s, kCheckpoint_s, 1);
   EXPECT_LT(marks.last_marked_s, marks.first_other_s);
 }
 
-// The bytes of the whole, though its beginning was not verified again.
+// The result has the same bytes as the whole replay, though its beginning was not verified again.
 TEST_F(ReplayCheckpoint, TheRestIsAsInTheWhole) {
   const Outcome rest = Replay(Log("whole"), "rest", "--from-checkpoint 6 --diff " + Log("whole"));
   EXPECT_EQ(rest.exit_code, 0) << rest.output;
@@ -132,14 +132,14 @@ TEST_F(ReplayCheckpoint, UpToItTheLogsMessagesCount) {
 
 TEST_F(ReplayCheckpoint, OfOneProcess) {
   const Outcome rest = Replay(Marked(), "of_one", "--from-checkpoint 6 --until 8 --only fusion");
-  EXPECT_EQ(rest.exit_code, 2) << rest.output;  // it differs where it was made again
+  EXPECT_EQ(rest.exit_code, 2) << rest.output;  // the computed results differ from the marked ones
   const MarksOf marks = ReadMarks(Log("of_one"));
   ExpectMarkedUpToCheckpoint(marks.results);
   EXPECT_EQ(marks.matches.others, 0);
 }
 
-// A live session's verification results come late: those that the log does not have at the
-// checkpoint are made.
+// In a live session verification results are late: those that the log does not have at the
+// checkpoint are computed.
 TEST_F(ReplayCheckpoint, OfALiveSessionNothingIsLostOrSaidTwice) {
   const Outcome rest = Replay(kSample, "live", "--from-checkpoint 6 --until 8");
   EXPECT_EQ(rest.exit_code, 0) << rest.output;

@@ -1,5 +1,5 @@
-// What `replay` offers to those who look for a mistake: a part of the log, one process alone, where
-// two runs part, why a constraint is as it is.
+// Tests the options of `replay` for finding a mistake: a part of the log, one process alone, the
+// first difference of two runs, the reasons of a constraint.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -16,7 +16,7 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 
-// The sample replayed once for all tests of this file.
+// Replays the sample once for all tests of this file.
 class ReplayDebugging : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -49,7 +49,8 @@ fs::path* ReplayDebugging::folder_ = nullptr;
 std::string* ReplayDebugging::constraint_ = nullptr;
 Outcome* ReplayDebugging::whole_ = nullptr;
 
-// From what the others said in a replay's log, each process says what it said there, and so do two.
+// From the others' messages in a replay's log, each process repeats its own messages; so do two
+// together.
 TEST_F(ReplayDebugging, EachProcessAloneRepeatsItself) {
   for (const char* process : {"place_recognition", "inter_map_ba", "fusion", "posegraph",
                               "global_ba", "posegraph,global_ba"}) {
@@ -59,7 +60,7 @@ TEST_F(ReplayDebugging, EachProcessAloneRepeatsItself) {
   }
 }
 
-// What it would not do is refused, not left out in silence.
+// Outputs that such a replay cannot give are refused, not left out silently.
 TEST_F(ReplayDebugging, OneProcessAloneHasNoReport) {
   for (const char* option : {"--explain 1", "--expect demo", "--recording 1=folder"}) {
     const Outcome outcome = Replay(kSample, "refused", std::string("--only fusion ") + option);
@@ -73,8 +74,8 @@ TEST_F(ReplayDebugging, APartOfTheLog) {
   const Outcome info = RunCommand("pangea-log info " + Log("part"));
   EXPECT_THAT(info.output, HasSubstr("KEYFRAME_1"));
   EXPECT_LT(fs::file_size(Log("part")), fs::file_size(Log("whole")));
-  // It ends with what waits for a quiet bus: there it parts from the whole, not in its verification
-  // results.
+  // The partial replay ends with the work that waits for a quiet bus: there it differs from the
+  // whole, but not in its verification results.
   EXPECT_EQ(part.exit_code, 2) << part.output;
   EXPECT_THAT(part.output, HasSubstr("they part at"));
   EXPECT_THAT(part.output.substr(part.output.find("they part at")),

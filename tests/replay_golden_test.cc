@@ -1,4 +1,4 @@
-// A captured session replays to a known map, however often the code around it is rewritten.
+// Tests that a captured session replays to a known map, also after changes of the code.
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What a compiler's rounding may move after thousands of optimisation steps, metres.
+// Differences, m, that rounding by a compiler may cause after thousands of optimisation steps.
 constexpr double kTolerance_m = 0.005;
 
 TEST(ReplayGolden, TwoWalks) {

@@ -1,5 +1,5 @@
-// Options from the file to the process, from there into the capture, and from the capture into the
-// replay.
+// Tests the way of options from the file to the process, then into the capture, and from the
+// capture into the replay.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

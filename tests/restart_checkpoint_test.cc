@@ -1,5 +1,5 @@
-// A server process that restores a checkpoint and reads the rest of the journal says what one says
-// that reads all of it, byte for byte, then and of what comes later.
+// Tests that a server process which restores a checkpoint and reads the rest of the journal
+// publishes the same bytes as one that reads the whole journal, then and later.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -40,7 +40,7 @@ struct Event {
 };
 using Events = std::vector<Event>;
 
-// What the journal gets, and what else the processes go by.
+// Whether the event is in the journal; the processes read other channels, too.
 bool IsJournalled(const std::string& channel) {
   return channel.starts_with(channels::kKeyframePrefix) || channel == channels::kPlaceMatch ||
          channel == channels::kConstraint;
@@ -60,7 +60,7 @@ Events RecordedEvents() {
   return events;
 }
 
-// "CONSTRAINT 12": the first message that differs, and which of them it is; empty if none does.
+// "CONSTRAINT 12": channel and index of the first message that differs; empty if none does.
 std::string Difference(const Events& a, const Events& b) {
   for (size_t i = 0; i < std::max(a.size(), b.size()); ++i) {
     if (i >= a.size() || i >= b.size() || a[i] != b[i]) {
@@ -70,7 +70,7 @@ std::string Difference(const Events& a, const Events& b) {
   return "";
 }
 
-// The last MAP_STATE, as if it were the first.
+// The last MAP_STATE, with revision 1 as if it were the first.
 Event NewestState(const Events& events) {
   map_state_t state{};
   for (const Event& event : events) {
@@ -101,7 +101,7 @@ std::unique_ptr<Process> MakePoseGraph(Bus& bus, const CheckpointPlace& checkpoi
 struct Named {
   std::string name;
   MakeProcess make;
-  std::string says;  // in the end
+  std::string says;  // channel on which its results end
 };
 
 void PrintTo(const Named& named, std::ostream* out) { *out << named.name; }
@@ -114,7 +114,7 @@ class RestartCheckpoint : public testing::TestWithParam<Named> {
   }
   ~RestartCheckpoint() override { fs::remove_all(folder_); }
 
-  // The first so many events as a journal.
+  // The journal of the first `count` events.
   std::string Journal(size_t count) const {
     std::string path = folder_ / "journal.lcm";
     LogFileWriter writer(path);
@@ -132,7 +132,7 @@ class RestartCheckpoint : public testing::TestWithParam<Named> {
                    ToMessage(JournalFile{journal, ReadJournalState(journal, {})}));
     bus.Drain();
   }
-  // What a process says that starts on this journal, `num_live` events of the bus later.
+  // The messages of a process that starts on this journal and gets `num_live` further events.
   Events Said(const std::string& journal, size_t count, const CheckpointPlace& checkpoint,
               size_t num_live = 0) const {
     LocalBus bus;
@@ -233,8 +233,8 @@ TEST_P(RestartCheckpoint, OneOfAnotherProcessOrVersionIsNotUsed) {
   EXPECT_THAT(why_not(own.process, own.format + 1), testing::HasSubstr("it is of another version"));
 }
 
-// What came after the checkpoint is read as if all had been read. The pose graph begins with the
-// solution it has, and agrees when it has solved all from the beginning.
+// The rest of the journal after the checkpoint is read as if all had been read. The pose graph
+// starts with the restored solution; after it has solved all from the beginning, both agree.
 TEST_P(RestartCheckpoint, ReadsTheRestOfTheJournal) {
   const size_t count = events_.size() / 2;
   WriteCheckpoint(Journal(count / 2));

@@ -1,4 +1,4 @@
-// pangea-server with its real processes.
+// Tests pangea-server with its real processes.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 using testing::HasSubstr;
 using testing::Not;
 
-// On buses of this test's own.
+// The server runs on buses that only this test uses.
 std::string ServerCommand(const fs::path& folder) {
   const int port = 20000 + getpid() % 6000 * 2;
   const auto url = [](int at) {
@@ -33,7 +33,7 @@ TEST(Server, RunsAllStartsAgainWhatDiesAndEndsInOrder) {
   std::ofstream(folder / "options" / "posegraph.yaml") << "{}\n";
   const std::string killed =
       "pgrep -f 'pangea-fusion.*" + std::to_string(20000 + getpid() % 6000 * 2) + "'";
-  // A file: pgrep would find the shell itself by a command line with all this in it.
+  // The script is a file: else pgrep would find the shell itself by its command line.
   std::ofstream(folder / "run.sh") << fmt::format(
       "{} --options-dir {}/options & server=$!; sleep 3; kill -9 $({}); sleep 2; "
       "kill -INT $server; wait $server; echo exit code $?; "
@@ -55,7 +55,7 @@ TEST(Server, RunsAllStartsAgainWhatDiesAndEndsInOrder) {
   EXPECT_TRUE(fs::exists(folder / "map.lcm.logs" / "fusion.txt"));
 }
 
-// The server's own gateway finds its port taken the second time.
+// In the second run the port of the server's own gateway is in use.
 TEST(Server, StartsTheGatewayForPhonesAndRunsOnWithoutIt) {
   const fs::path folder = FreshFolder("server_phone");
   const int port = 20000 + getpid() % 6000 * 2;
@@ -80,7 +80,7 @@ TEST(Server, StartsTheGatewayForPhonesAndRunsOnWithoutIt) {
   EXPECT_THAT(outcome.output, HasSubstr("second exit code 0"));
 }
 
-// What the anchors' API answers to a page of the origin; `$1` is the script's port.
+// A script that prints the answer of the anchors' API to a page of the origin; `$1` is its port.
 std::string AskAsPageOf(const std::string& origin) {
   return fmt::format(
       "exec 3<>/dev/tcp/127.0.0.1/$1; printf 'GET /v1/anchors HTTP/1.0\\r\\nHost: 127.0.0.1\\r\\n"

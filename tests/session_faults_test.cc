@@ -1,5 +1,5 @@
-// What a session file does to its processes on purpose: a server process is killed, an agent is cut
-// off and comes back, and the map is what was expected.
+// Tests the faults of a session file: a server process is killed, an agent is disconnected and
+// returns, and the map is as expected.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -41,7 +41,7 @@ TEST(SessionFaults, ACutOffAgentAndAKilledProcessCostNothing) {
   fs::remove_all(folder);
 }
 
-// As on a full disk: no file grows beyond 300 kB. The server never gets the rest written.
+// As on a full disk: no file grows beyond 300 kB. The server can never write the rest.
 TEST(SessionFaults, AFullDiskIsSaidAndCtrlCEndsTheWaiting) {
   const fs::path folder = FreshFolder("session_full_disk");
   const std::string keyframes = "keyframes: " PANGEA_SOURCE_DIR "/logs/two_walks/session.lcm";

@@ -1,6 +1,6 @@
-// The main job with real processes on real buses: two recordings of one hall go in, one map comes
-// out; its capture replays to the same map; what was expected is told; and what users get wrong
-// gets an answer.
+// Tests the main task with real processes on real buses. Two recordings of one hall become one map;
+// the capture replays to the same map; expectations are reported; and mistakes of users get a
+// helpful message.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ using testing::HasSubstr;
 constexpr double kMaxAteJoint_m = 0.12;
 constexpr double kMaxAteVio_m = 0.2;
 
-// Played once for all tests of this file.
+// The session is run once for all tests of this file.
 class SessionTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -34,7 +34,8 @@ class SessionTest : public ::testing::Test {
     delete folder_;
     delete run_;
   }
-  // The recordings here have images of half the size, and end before an anchor has settled.
+  // The test's recordings have images of half the size, and end before an anchor's error has
+  // settled.
   static fs::path DemoAtHalfSize() {
     std::stringstream text;
     text << std::ifstream(PANGEA_SOURCE_DIR "/sessions/demo.yaml").rdbuf();
@@ -96,7 +97,7 @@ TEST_F(SessionTest, ReplayGivesTheSameBytesTwiceAndTheSameMap) {
     const Outcome replay = RunCommand("pangea-session replay " + Out("session.lcm").string() +
                                       " --out " + (*folder_ / name).string());
     ASSERT_EQ(replay.exit_code, 0) << replay.output;
-    // The capture remembers what was expected of it.
+    // The capture contains the session's expectations.
     EXPECT_THAT(replay.output, testing::AllOf(HasSubstr("| fused_by "), HasSubstr("| met ")));
   }
   for (const auto& entry : fs::directory_iterator(*folder_ / "replay_1")) {
@@ -120,7 +121,7 @@ TEST_F(SessionTest, ExpectationsAreReported) {
   }
   EXPECT_THAT(run_->output, HasSubstr("## Expectations"));
   EXPECT_THAT(ReadFile(Out("report.md")), HasSubstr("## Expectations"));
-  // Others are given, and missed.
+  // Other expectations are given, and not met.
   const fs::path strict = *folder_ / "strict.yaml";
   std::ofstream(strict) << "agents: [{id: 1, recording: walk_1}]\n"
                            "expect: {groups: 1, ate_joint_m: 0.000001}\n";
@@ -132,7 +133,7 @@ TEST_F(SessionTest, ExpectationsAreReported) {
               HasSubstr("pangea-session: expected ate_joint_m at most 1e-06 m, got "));
   EXPECT_THAT(again.output, testing::Not(HasSubstr("expected groups")));
   EXPECT_THAT(ReadFile(*folder_ / "report" / "report.html"), HasSubstr("id=\"expectations\""));
-  // The agents' own logs lie beside the server's.
+  // The agents' own logs are beside the server's.
   const auto reported = ReadJson(*folder_ / "report" / "report.json");
   const auto live = ReadJson(Out("report.json"));
   for (int i = 0; i < 2; ++i) {
@@ -162,7 +163,7 @@ TEST(SessionFolder, AnEarlierSessionIsMovedAside) {
   EXPECT_THAT(dot.output, HasSubstr("--out .: holds an earlier session"));
 }
 
-// What is replayed is looked at before anything is moved for good.
+// A replay checks its input before it moves any folder.
 TEST(SessionMistakes, OfAReplayLeaveTheEarlierSession) {
   const fs::path out = FreshFolder("replay_mistakes") / "out";
   const std::string log = PANGEA_SOURCE_DIR "/logs/two_walks/session.lcm ";
@@ -203,7 +204,7 @@ TEST(SessionMistakes, GetAnAnswer) {
   EXPECT_EQ(outcome.exit_code, 1);
   EXPECT_THAT(outcome.output, testing::AllOf(HasSubstr("recordin"), HasSubstr("recording")));
 
-  // Before anything is started or moved.
+  // This error is found before anything is started or moved.
   fs::create_directories(folder / "empty" / "mav0" / "cam0");
   fs::create_directories(folder / "empty" / "mav0" / "imu0");
   const fs::path empty = WriteSession(folder, {"id: 1, recording: empty"});

@@ -1,4 +1,4 @@
-// pangea-site and pangea-server --site, as people use them.
+// Tests pangea-site and pangea-server --site as a user runs them.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -17,7 +17,7 @@ using testing::ContainsRegex;
 using testing::HasSubstr;
 using testing::Not;
 
-// On buses of this test's own.
+// Buses that only this test uses.
 std::string Buses() {
   const int port = 33000 + getpid() % 6000 * 2;
   return fmt::format("--bus 'udpm://239.255.76.67:{}?ttl=0' --link 'udpm://239.255.76.67:{}?ttl=0'",
@@ -29,7 +29,7 @@ class SiteProgram : public testing::Test {
   const fs::path folder = FreshFolder("site");
   const std::string site = folder / "hall";
 
-  // A journal of both walks, with nothing said of them yet.
+  // The journal of both walks contains keyframes only, without matches or results.
   void MakeSiteOfWalks() const {
     ASSERT_EQ(Site(fmt::format("create {} {}", site, Buses())).exit_code, 0);
     const Outcome cut = RunCommand(
@@ -45,7 +45,7 @@ class SiteProgram : public testing::Test {
 
 TEST_F(SiteProgram, ServesASiteThatIsLookedAtAndBackedUpMeanwhile) {
   MakeSiteOfWalks();
-  // What is done while the server runs, and then what it left.
+  // The commands while the server runs, and its result at the end.
   std::ofstream(folder / "run.sh") << fmt::format(
       "pangea-server --site {0} & server=$!; sleep 6\n"
       "echo server $server\n"
@@ -73,7 +73,7 @@ TEST_F(SiteProgram, ServesASiteThatIsLookedAtAndBackedUpMeanwhile) {
   EXPECT_EQ(Site("compact " + site).exit_code, 0);
 }
 
-// Two days: a server on each walk by itself, which matches its keyframes; then one on both.
+// First a server on each walk alone, which matches its keyframes; then a server on both.
 TEST_F(SiteProgram, AServerFusesTheMapsOfTwoSitesThatWereMerged) {
   std::ofstream(folder / "run.sh") << fmt::format(
       R"(cd {0}
@@ -120,7 +120,7 @@ TEST_F(SiteProgram, DeletesWhatIsNamed) {
   EXPECT_EQ(outcome.exit_code, 1);
   EXPECT_THAT(outcome.output, HasSubstr("'hall' is not the site's name, 'The hall'"));
   EXPECT_TRUE(fs::exists(site));
-  EXPECT_EQ(Site("delete " + site).exit_code, 1);  // nobody there to ask
+  EXPECT_EQ(Site("delete " + site).exit_code, 1);  // no user there to confirm it
   outcome = RunCommand("echo The hall | pangea-site delete " + site);
   EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
   EXPECT_FALSE(fs::exists(site));

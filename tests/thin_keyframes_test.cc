@@ -1,4 +1,4 @@
-// What an uplink under a budget leaves of keyframes still makes one map.
+// Tests that the keyframes which an uplink under a budget sends still give one map.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Of the sample's keyframes every fourth is bare, the others have few untracked corners.
+// Of the sample's keyframes every fourth is Bare, the others keep few untracked corners.
 void WriteThinLog(const fs::path& path) {
   LogFileWriter log(path.string());
   int64_t utime = 0;
@@ -40,7 +40,7 @@ TEST(ThinKeyframes, MakeOneMap) {
   const auto report = ReadJson(out / "report.json");
   ASSERT_EQ(report["groups"].size(), 1u) << replay.output;
   EXPECT_EQ(report["groups"][0]["agents"], nlohmann::json({1, 2}));
-  // Every keyframe has its pose, and it is near the one that whole keyframes give.
+  // Every keyframe has a pose, near the one that complete keyframes give.
   const fs::path expected = fs::path(PANGEA_SOURCE_DIR) / "logs" / "two_walks" / "expected";
   for (const char* name : {"agent_1.tum", "agent_2.tum"}) {
     EXPECT_LT(Distance_m(out / name, expected / name), 0.05) << name;

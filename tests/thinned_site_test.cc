@@ -1,5 +1,5 @@
-// A server on a site that was thinned, live: an agent walks in and finds the anchor of a visit of
-// which little stayed; and again on what the first server left.
+// Tests a live server on a thinned site: an agent comes and finds the anchor of a visit of which
+// few keyframes are left. The test is repeated on the journal that the first server leaves.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -36,7 +36,7 @@ using session::ChildProcess;
 
 constexpr int32_t kAgent = 2;
 constexpr int kNumVisits = 4;  // of the second walk, in the journal
-constexpr int32_t kSeq = 15;   // of the keyframe that the anchor is placed by
+constexpr int32_t kSeq = 15;   // of the keyframe at which the anchor is placed
 
 double Now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
@@ -53,13 +53,13 @@ class ThinnedSite : public testing::Test {
       }
     }
     std::vector<site::StoredEvent> events = walks;
-    // In the second visit's map, whose views the newer ones have.
+    // The keyframe is in the second visit's map, whose views newer visits have too.
     KeyframeId keyframe{*Parse(walk.front().id.map).value, kSeq};
     keyframe.map.opened_utime += 1;
     const Eigen::Vector3d p_body_anchor(2, 0.3, -0.2);
     events.push_back(
         site::PlacementEvent({kAgent, 1'700'000'000'000'000}, 0, keyframe, p_body_anchor));
-    // Each visit's odometry has the same numbers.
+    // The odometries of all visits have the same numbers.
     p_odom_anchor = *Parse(walk.at(kSeq).T_odom_body).value * p_body_anchor;
     hall = site::MakeSite(folder / "hall", events);
     MakeKeyFile(hall.keys() / KeyFileName(kAgent), kAgent);
@@ -72,7 +72,7 @@ class ThinnedSite : public testing::Test {
   }
   static std::string Program(const std::string& name) { return PANGEA_BINARY_DIR "/bin/" + name; }
 
-  // The second walk as a visit that the journal does not have.
+  // Writes the second walk as a visit that is not in the journal.
   fs::path WriteWalk(int visit) const {
     fs::path file = folder / fmt::format("visit_{}.lcm", visit);
     LogFileWriter log(file.string());
@@ -96,7 +96,7 @@ class ThinnedSite : public testing::Test {
     return done();
   }
 
-  // A server, ready; then the agent. Where it is told the anchor is.
+  // Starts a server, then the agent, and checks the anchor's position that the agent receives.
   void WalkIn(int visit) {
     LcmBus server_bus(Url(0)), agent_bus(Url(2));
     std::map<std::string, status_t> statuses;
@@ -143,7 +143,7 @@ class ThinnedSite : public testing::Test {
       }
       return heard && !player.running();
     })) << statuses["posegraph"].summary;
-    // What the last keyframes say, too; and then nobody asks for what is in no journal any more.
+    // Waits for the results of the last keyframes; then no process may request thinned keyframes.
     Until(4, server_bus, [] { return false; });
     requests = 0;
     Until(3, server_bus, [] { return false; });
@@ -152,7 +152,7 @@ class ThinnedSite : public testing::Test {
     EXPECT_THAT(statuses["posegraph"].summary,
                 testing::StartsWith(fmt::format("{} maps in 1 groups", NumMaps())));
     ASSERT_TRUE(heard);
-    // What the odometry has drifted since is in it.
+    // The odometry's drift since the placement is a part of this difference.
     EXPECT_LT((heard->T_odom_anchor.t - p_odom_anchor).norm(), 0.1)
         << heard->T_odom_anchor.t.transpose() << " for " << p_odom_anchor.transpose();
     player.Stop(5);

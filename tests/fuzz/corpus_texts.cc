@@ -33,7 +33,7 @@ std::string KeyText() {
   return ReadTextFile(file);
 }
 
-// In the order of fuzz_options.cc.
+// One seed for each kind of file, in the order of fuzz_options.cc.
 void OptionFiles(const Corpus& corpus) {
   const std::string session =
       "agents:\n  - {id: 1, keyframes: a.lcm, delay: 1.5, duration: 60, link: {loss: 0.1, "

@@ -101,7 +101,7 @@ void QuickBus::Drain() {
 
 void Play(Bytes input, const std::vector<Channel>& table, QuickBus* bus,
           const std::function<void(int64_t wait_us)>& poll) {
-  constexpr size_t kMaxSteps = 100;  // slower than that is no find
+  constexpr size_t kMaxSteps = 100;  // more steps would only be slow
   std::vector<Step> steps = Steps(input);
   steps.resize(std::min(steps.size(), kMaxSteps));
   for (Step& step : steps) {

@@ -1,4 +1,5 @@
-// The agent_handler with a fresh journal, and everything it hears on the link and the server bus.
+// The agent_handler with a new journal, and all channels of the link and the server bus that it
+// reads.
 
 #include "agent_handler/agent_handler_process.h"
 #include "fuzz.h"
@@ -18,7 +19,7 @@ struct Files {
   const std::filesystem::path journal = ScratchFolder() / "journal.lcm";
 };
 
-// Seals what a target's input says on HELLO, PIECE, ...
+// Seals the bodies that an input has on HELLO, PIECE, ...
 class Agent {
  public:
   Agent(QuickBus* bus, const SecretKey& key) : session_(1, key) {
@@ -31,7 +32,8 @@ class Agent {
     }
     bus->Subscribe("LINK_DOWN_1",
                    [this](const std::string&, Bytes packet) { session_.Open(packet); });
-    for (int i = 0; i < 2; ++i) {  // the second names the run that the first was told
+    // The second one names the run that the answer to the first has named
+    for (int i = 0; i < 2; ++i) {
       bus->Publish("HELLO", Encode(LinkHello{}));
       bus->Drain();
     }

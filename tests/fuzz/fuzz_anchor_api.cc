@@ -1,5 +1,5 @@
-// A request to the API of anchors: "METHOD TARGET\n", then the body. What it asks to be journalled
-// is journalled, and asked for.
+// A request to the API of anchors: "METHOD TARGET\n", then the body. Edits that the API requests
+// are journalled and passed back to it.
 
 #include <nlohmann/json.hpp>
 
@@ -82,7 +82,7 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   fuzz::Apps apps;
   const std::string body = text.substr(std::min(line + 1, text.size()));
   apps.Ask({text.substr(0, space), text.substr(target, line - target), "localhost", "", body});
-  // The body's decoder alone, whatever the first line says.
+  // Tests the body's decoder alone, independently of the first line.
   apps.Ask({"PUT", "/v1/anchors/1/17", "localhost", "\"1\"", body});
   apps.Ask({"GET", "/v1/anchors", "localhost", "", ""});
   return 0;

@@ -1,5 +1,5 @@
-// Datagrams of several senders on a multicast bus, one after the other: what a receiver makes of
-// them below the channel. A step's channel is who sends it.
+// Datagrams of several senders on a multicast bus, one after the other, as a receiver assembles
+// them below the level of channels. A step's channel is the sender.
 
 #include "bus/transport/udpm_assembler.h"
 #include "fuzz.h"
@@ -16,7 +16,7 @@ int64_t Refused(const UdpmAssembler& assembler) {
   return refused;
 }
 
-// Reads all of it, for the address sanitizer.
+// Reads all bytes, so that the address sanitizer checks them.
 void Use(const UdpmAssembler::Message& message) {
   Require(!message.channel.empty() && message.channel.size() <= UdpmAssembler::kMaxChannel &&
               message.channel.find('\0') == std::string::npos,

@@ -1,5 +1,5 @@
-// Any message by the text of its type, as the tools that list and compare logs read it. The first
-// byte says of which type.
+// Any message, decoded by the text of its type, as in the tools that list and compare logs. The
+// first byte selects the type.
 
 #include <map>
 
@@ -16,7 +16,7 @@ bool Decodes(Bytes bytes) {
   return DecodeMessage(bytes, &message);
 }
 
-// lcm-gen's decoders, by fingerprint.
+// lcm-gen's decoders by fingerprint.
 template <typename... Messages>
 std::map<int64_t, bool (*)(Bytes)> DecodersOf() {
   return {{Messages::getHash(), Decodes<Messages>}...};

@@ -1,6 +1,6 @@
-// What strangers say to the gateway: the first byte chooses a request to join, a target, an upload
-// or a socket; then a body, a target, messages of an upload (a byte of length each), or a target's
-// end and what is said on its socket.
+// Input from strangers to the gateway. The first byte selects a request to join, a target, an
+// upload or a socket. Then follow a body, a target, messages of an upload (with a byte of length
+// each), or a target's end and the messages on its socket.
 
 #include <nlohmann/json.hpp>
 
@@ -13,7 +13,7 @@ namespace {
 
 constexpr int32_t kAgent = 7;
 
-// Keeps nothing, and knows what it was promised.
+// Stores nothing, but checks the sizes that it was told.
 class CountingStore : public RecordingStore {
  public:
   std::string Begin(int32_t agent_id, int64_t bytes) override {
@@ -92,7 +92,7 @@ class Strangers {
   }
 
  private:
-  // Of an agent that has proven its key.
+  // A peer that has proven its agent's key.
   std::unique_ptr<web::WebPeer> Proven(const std::string& path) {
     auto socket =
         gateway_.Open({"GET", path + "?agent=" + std::to_string(kAgent), "localhost", "", ""});

@@ -1,4 +1,4 @@
-// A journal or a log of keyframes as a crash, a full disk or a stranger left it.
+// A journal or a log of keyframes after a crash, on a full disk, or from a stranger.
 
 #include <algorithm>
 #include <fstream>
@@ -22,7 +22,7 @@ void StartOn(const std::filesystem::path& journal) {
   bus.Drain();
 }
 
-// A log is good, or it says what is wrong.
+// A log either opens or throws an error with a message.
 bool Opens(const std::function<void()>& open) {
   try {
     open();
@@ -50,7 +50,7 @@ int64_t NumFiles(const std::filesystem::path& folder) {
 
 int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace pangea;
-  std::cerr.rdbuf(nullptr);  // each damaged journal says so
+  std::cerr.rdbuf(nullptr);  // each damaged journal prints a warning
   const auto folder = fuzz::ScratchFolder() / "journal";
   std::filesystem::remove_all(folder);
   std::filesystem::create_directories(folder);

@@ -1,4 +1,4 @@
-// Every other type with a Parse, and the bodies of link packets, by the first byte.
+// Every other type with a Parse, and the bodies of link packets; the first byte selects the type.
 
 #include <iterator>
 
@@ -27,7 +27,7 @@ void ParseBytes(std::vector<uint8_t> bytes) {
   }
 }
 
-// In chunks.
+// Parses the state in chunks.
 void ParseMapState(std::vector<uint8_t> bytes) {
   SetFingerprint(map_state_t::getHash(), &bytes);
   map_state_t message{};

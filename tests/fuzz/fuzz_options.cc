@@ -1,4 +1,4 @@
-// Option files, session files and key files, by the first byte.
+// Option files, session files and key files; the first byte selects the kind.
 
 #include <iterator>
 #include <stdexcept>

@@ -1,4 +1,4 @@
-// The text files of a recording in EuRoC's format: six parts, form feeds between them.
+// The text files of a recording in EuRoC's format: six parts, separated by form feeds.
 
 #include <array>
 #include <opencv2/imgcodecs.hpp>
@@ -20,7 +20,7 @@ constexpr std::array kFiles = {"cam0/sensor.yaml",
                                "state_groundtruth_estimate0/data.csv",
                                "state_groundtruth_estimate0/sensor.yaml"};
 
-// With the one image that the corpus' data.csv names.
+// Makes the folders with the one image that the corpus' data.csv names.
 fs::path MakeFolders() {
   fs::path mav0 = ScratchFolder() / "recording" / "mav0";
   for (const char* folder : {"cam0/data", "imu0", "state_groundtruth_estimate0"}) {

@@ -1,4 +1,4 @@
-// A segment of a spool as a crash, a power cut or a stranger left it.
+// A segment of a spool after a crash or a power cut, or from a stranger.
 
 #include <iostream>
 #include <stdexcept>
@@ -18,7 +18,7 @@ bool IsKeyframe(const std::vector<uint8_t>& data, const KeyframeId& id) {
   return DecodeMessage(data, &message) && Parse(message.id).value == id;
 }
 
-// All that is kept is the agent's, and what can be read is what was asked for.
+// All kept keyframes must be the agent's, and a read keyframe must be the requested one.
 void Use(Spool* spool) {
   for (const KeyframeId& id : spool->Kept()) {
     Require(id.map.agent_id == kAgent, "only the agent's own keyframes");
@@ -32,7 +32,7 @@ void Use(Spool* spool) {
 
 int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace pangea;
-  std::cerr.rdbuf(nullptr);  // each damaged segment says so
+  std::cerr.rdbuf(nullptr);  // each damaged segment prints a warning
   const auto folder = fuzz::ScratchFolder() / "spool";
   std::filesystem::remove_all(folder);
   std::filesystem::create_directories(folder);

@@ -1,4 +1,4 @@
-// The uplink, and everything it hears on its agent's bus and the link.
+// The uplink, and all channels of its agent's bus and of the link that it reads.
 
 #include "fuzz.h"
 #include "link_channels.h"

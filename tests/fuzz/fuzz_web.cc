@@ -1,5 +1,5 @@
-// The bytes of a connection, as they come from the network: HTTP requests and WebSocket frames, to
-// the gateway's web server without TLS.
+// The bytes of a connection from the network (HTTP requests and WebSocket frames) to the gateway's
+// web server without TLS.
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
@@ -14,7 +14,7 @@
 namespace pangea::fuzz {
 namespace {
 
-constexpr int kMaxRounds = 50;  // of 1 ms, until it has answered
+constexpr int kMaxRounds = 50;  // of 1 ms, until the server has answered
 
 class NoRecordings : public RecordingStore {
  public:
@@ -48,7 +48,7 @@ class Server {
   void Take(Bytes bytes) {
     gateway_.SetNow(now_us_ += 1'000'000);
     const int fd = Connect();
-    // What a closed connection does not take is nobody's loss.
+    // It is no error if the server has closed the connection before it has read all bytes.
     (void)!send(fd, bytes.data(), bytes.size(), MSG_NOSIGNAL);
     shutdown(fd, SHUT_WR);
     bool is_over = false;
@@ -77,7 +77,7 @@ class Server {
     address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     Require(connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0,
             "the server listens");
-    // No port waits for the other side's last words: many connections follow one another.
+    // A closed port must not wait for last packets: many connections follow one another.
     const linger none{1, 0};
     setsockopt(fd, SOL_SOCKET, SO_LINGER, &none, sizeof(none));
     return fd;

@@ -1,7 +1,7 @@
 // Seeds for the fuzz targets, from a captured session: make_corpus LOG CORPUS_FOLDER
 //
-// Real messages with their keyframes cut down to a few corners, so that the seeds are small enough
-// for a repository and mutations hit fields, not descriptors.
+// The seeds are real messages, with keyframes cut down to a few corners. So they are small enough
+// for a repository, and mutations hit fields, not descriptors.
 
 #include <algorithm>
 #include <cstdio>
@@ -108,7 +108,7 @@ MapId MapOf(const Payload& keyframe_bytes) {
   return Parse(message.id).value->map;
 }
 
-// By two senders in turn, and what no receiver may obey.
+// Datagrams of two senders in turn, and malformed ones, which every receiver must refuse.
 void Datagrams(const Corpus& corpus) {
   const std::string name = "A" + std::string(1, '\0'), data(50, 'x');
   Payload whole, malformed;
@@ -127,7 +127,7 @@ void Datagrams(const Corpus& corpus) {
   corpus.Add("datagram", "malformed", malformed);
 }
 
-// In the order of fuzz_messages.cc.
+// Seeds in the order of fuzz_messages.cc.
 void Messages(const std::vector<Captured>& events, const Corpus& corpus) {
   const Payload& first = First(events, "KEYFRAME_1");
   KeyframeMessage keyframe{};
@@ -161,7 +161,7 @@ void Messages(const std::vector<Captured>& events, const Corpus& corpus) {
   }
 }
 
-// Of each type in the log one message, by its place in LcmSchemas.
+// One message of each type in the log, with the type's index in LcmSchemas.
 void Fields(const std::vector<Captured>& events, const Corpus& corpus) {
   const std::vector<LcmSchema> schemas = LcmSchemas();
   std::set<int64_t> taken;
@@ -179,7 +179,7 @@ void Fields(const std::vector<Captured>& events, const Corpus& corpus) {
   }
 }
 
-// Both ends of a link that works, as each end heard it.
+// The packets that each end of a working link receives.
 void Link(const std::vector<Captured>& events, const Corpus& corpus) {
   Uplink uplink{UplinkOptions{}};
   AgentHandler handler(1, ReceiverOptions{});
@@ -253,7 +253,7 @@ void Spools(const std::vector<Captured>& events, const Corpus& corpus) {
   corpus.AddText("spool", "torn", text.substr(0, text.size() - 100));
 }
 
-// A camera of 32 x 24 pixels, still, then moving.
+// A camera of 32 x 24 pixels: stationary, then moving.
 void Sensors(const Corpus& corpus) {
   CameraModel camera;
   camera.width = 32;

@@ -1,7 +1,7 @@
-// Feeds a fuzz target every file of the folders named, so that what once was found stays mended,
-// and then mutants of them for a second: the bounded run of every build. They are the same ones in
-// each run, as far as it comes. libFuzzer, which learns from what it covers, goes further
-// (scripts/fuzz).
+// Feeds every file of the named folders to a fuzz target, so that an error once found stays mended.
+// Then it feeds mutants of the files for a second: the bounded run of every build. The mutants are
+// the same in each run, up to the number that the time allows. libFuzzer, which is guided by
+// coverage, goes further (scripts/fuzz).
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -42,7 +42,8 @@ Input Read(const fs::path& path) {
   return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
 }
 
-// One of the corpus with some bytes turned, filled, cut out, doubled, or taken from another one.
+// An input of the corpus with some bytes flipped, filled, removed, doubled, or taken from another
+// input.
 Input Mutant(const std::vector<Input>& corpus, std::mt19937_64& rng) {
   constexpr uint8_t kExtremes[] = {0x00, 0x7F, 0x80, 0xFF};
   Input input = corpus[rng() % corpus.size()];
@@ -74,7 +75,8 @@ Input Mutant(const std::vector<Input>& corpus, std::mt19937_64& rng) {
   return input;
 }
 
-// The file's content from now on; it stays open, or the disk would be waited for each time.
+// Replaces the file's content. The file stays open, as opening it each time would wait for the
+// disk.
 void Keep(int file, const Input& input) {
   pangea::fuzz::Require(
       pwrite(file, input.data(), input.size(), 0) == static_cast<ssize_t>(input.size()) &&
@@ -87,7 +89,7 @@ void Keep(int file, const Input& input) {
 int main(int argc, char** argv) {
   std::vector<Input> corpus;
   for (const fs::path& file : FilesOf(argc - 1, argv + 1)) {
-    std::printf("%s\n", file.filename().c_str());  // the last one named is the culprit
+    std::printf("%s\n", file.filename().c_str());  // the last file named caused a crash
     std::fflush(stdout);
     corpus.push_back(Read(file));
     LLVMFuzzerTestOneInput(corpus.back().data(), corpus.back().size());
@@ -95,7 +97,7 @@ int main(int argc, char** argv) {
   if (corpus.empty()) {
     return 1;
   }
-  // Left behind where one ends the process: it belongs into the corpus.
+  // The file stays if an input ends the process: that input belongs into the corpus.
   const fs::path culprit = fs::path(argv[0]).filename().string() + ".culprit";
   const int file = open(culprit.c_str(), O_CREAT | O_TRUNC | O_WRONLY | O_CLOEXEC, 0644);
   std::mt19937_64 rng(1);

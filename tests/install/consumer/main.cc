@@ -1,4 +1,4 @@
-// A pose correction as a message on a bus, and back as a domain type.
+// Sends a pose correction as a message on a bus, and converts it back to a domain type.
 
 #include <cstdio>
 #include <vector>
