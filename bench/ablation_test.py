@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What a rung takes away, how much of it, and which jobs that makes."""
+"""Tests the effect of each rung, its size, and the jobs that it needs."""
 
 import argparse
 import json

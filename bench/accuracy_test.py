@@ -1,4 +1,4 @@
-"""What keeps or makes a product again, and what counts as a value."""
+"""Tests when a product is kept or made again, and which values count."""
 
 import argparse
 import contextlib
@@ -178,7 +178,7 @@ class MeasuredTest(unittest.TestCase):
 
 
 class PaperTest(unittest.TestCase):
-    """A session's report compares with the paper too, and has no Python: its metrics are these."""
+    """The report of a session has no Python but compares with the paper too: its metrics must be the same."""
 
     SOURCE = Path(__file__).resolve().parents[1] / "modules/report/metrics/report_paper.cc"
 

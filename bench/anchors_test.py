@@ -1,4 +1,4 @@
-"""The session that bench/anchors writes, and what it makes of a report."""
+"""Tests the session that bench/anchors writes, and its evaluation of a report."""
 
 import json
 import math
@@ -87,11 +87,11 @@ class AnchorsTest(unittest.TestCase):
 
 T_BODY_CAM = (rot.normalised((1.0, 0.2, 0.0, 0.1)), (0.1, 0.0, 0.05))
 T_ODOM_REF = [(rot.normalised((1.0, 0.0, 0.0, yaw)), (yaw, 2.0, 0.0)) for yaw in (0.3, -0.4)]
-SCALE = 2.0  # metres of the map in one of the reference
+SCALE = 2.0  # metres of the map per unit of the reference
 
 
 def camera_at(t):
-    """T_ref_cam: a walk past the origin, looking at it."""
+    """T_ref_cam: a walk past the origin, with the camera towards it."""
     return rot.normalised((1.0, 0.02 * math.sin(t), 0.02 * t, 0.0)), (0.2 * math.sin(t), 0.1 * t, 0.05 * math.cos(t) - 1)
 
 
@@ -114,7 +114,7 @@ def event(wall_s, channel, data):
 
 
 class ReferenceTest(unittest.TestCase):
-    """Agent 1 has the seconds 0 to 10, agent 2 20 to 40 of a walk whose poses the reference has in half the size."""
+    """A walk: agent 1 has the seconds 0 to 10, agent 2 the seconds 20 to 40; the reference has all poses at half the size."""
 
     PLACED_S = 4.0
     P_CAM = (0.1, 0.2, 1.5)  # where agent 1 places the anchor
@@ -138,7 +138,7 @@ class ReferenceTest(unittest.TestCase):
         return event(t, f"POSE_{agent}", head + struct.pack(">iq", agent, 7) + rigid3(body_in_odom(agent, t, scale)))
 
     def session(self, scale=SCALE):
-        """Agent 2 shows the anchor from 25 s on, and 6 mm further on from 26 s."""
+        """Agent 2 shows the anchor from 25 s on, and from 26 s on with an additional error of 6 mm."""
         identity = struct.pack(">iq", 1, 55)
         T_odom_body = body_in_odom(1, self.PLACED_S, scale)
         T_odom_anchor = rot.compose(rot.compose(T_odom_body, T_BODY_CAM), ((1.0, 0.0, 0.0, 0.0), self.P_CAM))
@@ -185,7 +185,7 @@ class ReferenceTest(unittest.TestCase):
         found = report["anchors"][0]["agents"][0]
         self.assertAlmostEqual(found["error_m"], 0.03, places=4)
         self.assertAlmostEqual(found["largest_jump_m"], 0.006, places=6)
-        self.assertAlmostEqual(report["localised_s"], 5.1, places=3)  # shown at 25 s, with the next pose
+        self.assertAlmostEqual(report["localised_s"], 5.1, places=3)  # it is shown with the first pose after 25 s
         self.assertEqual(metrics(report, 2)["lost"], 1)
 
     def test_pixels_and_view(self):

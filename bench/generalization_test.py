@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Whether the ways go where they say, the spoilers spoil what they say, and each pair shares a scene."""
+"""Tests that the paths lead where they should, that each fault has the stated effect, and that each pair shares a scene."""
 
 import argparse
 import json
@@ -34,7 +34,7 @@ class WaysTest(unittest.TestCase):
         for begin, end in ((10, 17), (27, 40)):
             rest = [p for p in poses if begin <= p[0] - 1000 <= end]
             self.assertLess(max(math.dist(p[1:4], rest[0][1:4]) for p in rest), 1e-6)
-            self.assertLess(max(self.rotation(p, rest[0]) for p in rest), 1e-4)  # what nine digits leave of it
+            self.assertLess(max(self.rotation(p, rest[0]) for p in rest), 1e-4)  # the rounding error of nine digits
         self.assertGreater(math.dist(poses[0][1:4], poses[200][1:4]), 1)
 
     def test_turns_twice_on_the_spot(self):
@@ -108,7 +108,7 @@ class SpoilTest(unittest.TestCase):
         self.assertEqual(steps.painted["120.png"](bytes([100, 250])), bytes([180, 255]))
 
     def test_people_walk_past_the_true_camera(self):
-        # The camera looks along x; it stands at the origin and then is 1 m further on.
+        # The camera looks along x, first from the origin, then from 1 m further on.
         yaml = "T_BS:\n  data: [0, 0, 1, 0, -1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 0, 1]\nresolution: [640, 480]\n" \
                "intrinsics: [400, 400, 320, 240]\ndistortion_coefficients: [0, 0, 0, 0]\n"
         (self.mav0 / "cam0/sensor.yaml").write_text(yaml)
@@ -121,7 +121,7 @@ class SpoilTest(unittest.TestCase):
         for value, expected in ((x0 + x1, 640), (x1 - x0, 400 * people.WIDTH_M / 3), (y1, 240 + 400 * people.EYES_M / 3),
                                 (y1 - y0, 400 * people.HEIGHT_M / 3)):
             self.assertAlmostEqual(value, expected, places=3)
-        x2, x3, *_ = next(view.rectangles(one, 11.75))[0]  # 1.5 m to the right, and nearer by 1 m
+        x2, x3, *_ = next(view.rectangles(one, 11.75))[0]  # 1.5 m to the right, and 1 m nearer
         self.assertAlmostEqual(x2 + x3, 640 + 2 * 400 * 1.5 / 2, places=3)
         pixels = people.painted(bytes(640 * 480), view.camera, [((-10.0, 2.0, 470.0, 900.0), one.people[0].clothes)])
         self.assertEqual([i for i, grey in enumerate(pixels) if grey], [640 * y + x for y in range(470, 480) for x in (0, 1)])
@@ -169,7 +169,7 @@ class SpoilTest(unittest.TestCase):
         self.assertEqual(numbers(phone.imu_yaml, "rate_hz"), 100)
         column = [float(row[4]) for row in phone.imu]
         self.assertEqual(len(column), 2000)
-        jumps = [b - a for a, b in zip(column, column[1:])]  # white: their sigma is sqrt(2) of the samples'
+        jumps = [b - a for a, b in zip(column, column[1:])]  # white noise: their sigma is sqrt(2) times that of the samples
         expected = PHONE["accelerometer_noise_density"] * math.sqrt(2 * 100)
         self.assertAlmostEqual(math.hypot(*jumps) / math.sqrt(len(jumps)), expected, delta=0.1 * expected)
         self.assertEqual(numbers(phone.imu_yaml, "accelerometer_noise_density"), PHONE["accelerometer_noise_density"])

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What a run of a hundred agents comes to, from logs that are made up."""
+"""Tests the evaluation of a run of a hundred agents, with artificial logs."""
 
 import json
 import struct
@@ -18,7 +18,7 @@ OPENED = 1000
 
 
 def space(value):
-    """Dictionaries as messages."""
+    """Dictionaries as objects like messages."""
     if isinstance(value, dict):
         return Namespace(**{name: space(of_name) for name, of_name in value.items()})
     return [space(one) for one in value] if isinstance(value, list) else value
@@ -54,7 +54,7 @@ class HundredAgentsTest(unittest.TestCase):
         self.keyframes = {agent: [keyframe(agent, seq, 1_000_000 * (seq + 1)) for seq in range(3)] for agent in site.agents}
         self.corrections = {6: [correction(6, 0, 1_500_000), correction(6, 1, 2_300_000)],
                             7: [correction(7, 1, 2_500_000), correction(7, 2, 3_100_000)], 8: []}
-        self.lost = 0  # of the journal's last
+        self.lost = 0  # keyframes lost from the journal's end
         self.server = [constraint(6, 7, 0), constraint(6, 7, 2), constraint(7, 6, 1), constraint(7, 6, 2, accepted=False),
                        constraint(7, 8, 1), state(6), state(6, 7), state(8)]
 
@@ -77,7 +77,7 @@ class HundredAgentsTest(unittest.TestCase):
         found = self.metrics()
         self.assertTrue(is_good(found), found)
         self.assertEqual((found["sent"], found["missing"], found["strange"], found["accepted"]), (9, 0, 0, 4))
-        # Keyframe 0 of agent 7 came before its map was fused; keyframe 1 of agent 8 is of another group than agent 7.
+        # Keyframe 0 of agent 7 was sent before its map was fused; keyframe 1 of agent 8 is in another group than agent 7.
         self.assertEqual((found["first"]["count"], found["first"]["median_ms"]), (1, 1500))
         self.assertEqual((found["corrected"]["count"], found["corrected"]["median_ms"]), (2, 200))
         self.assertIn("| pangea-fusion | 2 | 4.0 | 4.0 |", table(found))

@@ -1,4 +1,4 @@
-"""What a row of the link's table says of its session's logs and report."""
+"""Tests a row of the link's table against its session's logs and report."""
 
 import json
 import struct

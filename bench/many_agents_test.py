@@ -1,4 +1,4 @@
-"""What a run of many agents comes to, from logs that are made up."""
+"""Tests the evaluation of a run of many agents, with artificial logs."""
 
 import struct
 import sys

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Whether the ways go where they say, who ought to meet shares a scene, and a row tells what it misses."""
+"""Tests that paths lead where they should, that sessions which should fuse share a scene, and that a row reports the bounds that it misses."""
 
 import argparse
 import json
@@ -36,7 +36,7 @@ class WaysTest(unittest.TestCase):
             speed = sum(math.hypot(*step) for step in steps) / world.seconds
             self.assertAlmostEqual(speed, world.way.speed, delta=0.25 * world.way.speed, msg=world.name)
             hardest = max(math.dist(a, b) for a, b in zip(steps, steps[1:])) * RATE_HZ ** 2
-            self.assertLess(hardest, 15, world.name)  # an unrounded corner: 70
+            self.assertLess(hardest, 15, world.name)  # with an unrounded corner: 70
 
     def test_every_lens_looks_ahead(self):
         for lens, (R_body_cam, _) in ways.EXTRINSICS.items():

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Whether alignment, drift, revisits and wrong constraints come out as they were made."""
+"""Tests that the known alignment, drift, revisits and wrong constraints are found."""
 
 import argparse
 import contextlib
@@ -23,7 +23,7 @@ Q = rot.normalised((0.5, -0.3, 0.8, 0.1))
 
 
 def loop(seconds=40, rate=5, period=20):
-    """Twice round, looking ahead."""
+    """Two rounds, with the camera looking ahead."""
     poses = []
     for i in range(int(seconds * rate)):
         t = i / rate
@@ -34,7 +34,7 @@ def loop(seconds=40, rate=5, period=20):
 
 
 def seen(poses, scale=1.0, q=Q, p=(3.0, -1.0, 2.0), late=0.0):
-    """The same in a frame, scale and clock of its own."""
+    """The same poses in another frame, with another scale and clock."""
     return [(t + late, rot.compose((q, p), (r, rot.scaled(scale, x)))) for t, (r, x) in poses]
 
 
@@ -127,7 +127,7 @@ class RevisitsTest(unittest.TestCase):
 
         self.assertEqual(check(constraint(101.0, 104.0), constraint(101.0, 113.0, 0.49)), (2, 0, 1))
         self.assertEqual(check(constraint(101.0, 104.0, 0.51)), (1, 1, 0))
-        self.assertEqual(check(constraint(101.0, 125.0, 0.9)), (1, 0, 1))  # across pieces
+        self.assertEqual(check(constraint(101.0, 125.0, 0.9)), (1, 0, 1))  # between pieces
         self.assertEqual(check(constraint(101.0, 125.0, 1.1)), (1, 1, 1))
         pieces[1].frame = 1
         self.assertEqual(check(constraint(101.0, 125.0, 1.1)), (0, 0, 1))
@@ -162,7 +162,7 @@ class TrajectoryTest(unittest.TestCase):
         T = (Q, (1.0, 2.0, 3.0))
         keyframes = [(t, rot.compose(T, pose)) for t, pose in odometry[::10]]
         dense = trajectory.at_camera_rate(keyframes, odometry)
-        self.assertEqual(len(dense), 191)  # up to the last keyframe
+        self.assertEqual(len(dense), 191)  # until the last keyframe
         for t, pose in dense:
             self.assertLess(math.dist(pose[1], rot.compose(T, dict(odometry)[t])[1]), 1e-9)
 

@@ -1,4 +1,4 @@
-"""What a start of a server comes to, from statuses that are made up."""
+"""Tests the evaluation of a server's start, with artificial statuses."""
 
 import sys
 import unittest

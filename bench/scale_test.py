@@ -1,4 +1,4 @@
-"""What a city comes to as a table, from runs that are made up."""
+"""Tests the table of cities, with artificial runs."""
 
 import sys
 import unittest

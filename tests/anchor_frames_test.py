@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The conversions of examples/anchors to the frames of Unity, three.js and WebXR, as they stand there: points transform alike."""
+"""Tests the conversions of examples/anchors to the frames of Unity, three.js and WebXR, evaluated from its text: points transform alike."""
 
 import ast
 import math
@@ -13,7 +13,7 @@ CODE = "".join((FOLDER / name).read_text() for name in ("unity.cs", "three.js"))
 
 
 def evaluated(pattern, **names):
-    """The arguments of a call in the examples that is spelt so, as numbers."""
+    """The arguments of a call with this text in the examples, as numbers."""
     found = re.search(re.escape(pattern) + r"\(([^)]*)\)", CODE)
     assert found, pattern
     tree = ast.parse(found[1].replace("p.position", "t"), mode="eval")
@@ -25,7 +25,7 @@ def cross(a, b):
 
 
 def rotated(q, v):
-    """v by the quaternion (x, y, z, w): the formula of all of these systems."""
+    """v rotated by the quaternion (x, y, z, w), by the formula of all of these systems."""
     u, w = q[:3], q[3]
     uv = cross(u, v)
     uuv = cross(u, uv)
@@ -33,7 +33,7 @@ def rotated(q, v):
 
 
 class Frames(unittest.TestCase):
-    """The conversions of the examples, as they stand there."""
+    """The conversions, evaluated from the text of the examples."""
 
     @staticmethod
     def unity(t, q):

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""docs/bus.md against what it describes: every type, every channel, who names it, how large it gets."""
+"""Compares docs/bus.md with the code and a log: every type, every channel, the modules that name it, the largest size."""
 
 import re
 import struct
@@ -30,7 +30,7 @@ BOTH_TYPES = {"KeyframeMessage": "keyframe_2_t"}  # decodes keyframe_t too
 
 
 def channels_in_code():
-    """Of modules/messages/channels.h, constants and functions: the channel each stands for, spelt as in the document."""
+    """The channels of modules/messages/channels.h, from constants and functions, spelt as in the document."""
     header = (ROOT / "modules/messages/channels.h").read_text()
     constants = dict(re.findall(r'\bstd::string_view (k\w+) = "([^"]+)";', header))
     functions = re.findall(r"\bstd::string (\w+)\([\w:]+ (agent_id|process)\) \{\s*return [^;]*\b(k\w+Prefix)\b", header)
@@ -47,7 +47,7 @@ CHANNELS = [(quoted(row[0])[0], row) for row in table("Channels")]
 
 
 def documented(channel):
-    """The documented channels of which this one of the bus is an instance."""
+    """The documented channels that describe this channel of the bus."""
     pattern = {"k": r"[0-9]+", "<process>": r"\w+"}
     return [row for name, row in CHANNELS
             if re.fullmatch(re.sub(r"(?<=_)(k|<process>)$", lambda m: pattern[m[0]], name), channel)]
@@ -86,7 +86,7 @@ class BusDoc(unittest.TestCase):
         self.assertEqual({name for name, _ in CHANNELS}, set(CHANNEL_OF.values()))
 
     def test_subscriptions_in_the_code(self):
-        """Each has the type of a documented row, and its module stands there."""
+        """Each has the type of a documented row, and its module is in the row."""
         checked = 0
         for path in (ROOT / "modules").rglob("*.cc"):
             if path.name.endswith("_test.cc") or "node_modules" in path.parts:
@@ -96,7 +96,7 @@ class BusDoc(unittest.TestCase):
                 self.assertTrue(rows, f"{path.name}: channels::{symbol} is {CHANNEL_OF[symbol]}")
                 self.assertEqual({quoted(row[1])[0] for row in rows}, {BOTH_TYPES.get(type_name, type_name)}, symbol)
                 module = path.relative_to(ROOT / "modules").parts[0]
-                if module not in ("bus", "loop_verification", "phone"):  # helpers of several processes; a bus of its own
+                if module not in ("bus", "loop_verification", "phone"):  # helpers of several processes, and a module with its own bus
                     self.assertTrue(any(module in row[3] for row in rows), f"{module} listens to {rows[0][0]}")
                 checked += 1
         self.assertGreater(checked, 20)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What the documentation refers to exists: files linked, source files named, scripts and programs in commands."""
+"""Tests that things named in the documentation exist: linked files, source files, scripts and programs in commands."""
 
 import re
 import subprocess
@@ -17,7 +17,7 @@ def without_code(text):
 
 
 def anchors_of(page):
-    """Of its headings, as GitHub makes them."""
+    """The anchors of the page's headings, as GitHub makes them."""
     headings = re.findall(r"^#+ (.*)$", page.read_text(), flags=re.M)
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
@@ -40,7 +40,7 @@ class DocLinks(unittest.TestCase):
         self.assertGreater(anchors, 10)
 
     def test_sources_named(self):
-        """By their path, or the end of it."""
+        """Sources are named by their path, or by its end."""
         sources = ["/" + name for name in subprocess.run(
             ["git", "-C", ROOT, "ls-files", "*.h", "*.cc", "*.py"], capture_output=True, text=True, check=True).stdout.split()]
         count = 0

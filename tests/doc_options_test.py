@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Options that the documentation gives to our programs exist: each `pangea-... --option` against the program's --help.
+"""Tests that the options in the documentation exist: each `pangea-... --option` is compared with the program's --help.
 
     doc_options_test.py BIN
 """
@@ -15,7 +15,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[1]
 PAGES = [ROOT / name for name in subprocess.run(
     ["git", "-C", ROOT, "ls-files", "*.md"], capture_output=True, text=True, check=True).stdout.split()]
 COMMAND = re.compile(r"\b(pangea-[a-z0-9-]+)([^\n`|;#]*)")
-# Scripts, the WebAssembly, a systemd unit.
+# These are scripts, the WebAssembly, and a systemd unit.
 NOT_BUILT = {"pangea-agent", "pangea-nats-config", "pangea-spy", "pangea-worker"}
 OPTION = re.compile(r"(?<![\w-])--[a-z][a-z0-9-]*")
 

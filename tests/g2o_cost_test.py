@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""The exported pose graph, read by another reader and by g2o's own definitions, has the cost that we say it has.
+"""Tests that the exported pose graph, read by another reader with g2o's own definitions, has the cost that our program reports.
 
     tests/g2o_cost_test.py PANGEA_LOG LOG
 
-Nothing of ours is used: the file's numbers alone, g2o's error of an SE(3) edge, e = (t, q_xyz) of Z^-1 T_i^-1 T_j, and the sum of
-e^T information e. Ours is a tangent in another frame (docs/conventions.md), the same to first order.
+The test uses no code of the project, only the file's numbers, g2o's error of an SE(3) edge, e = (t, q_xyz) of Z^-1 T_i^-1 T_j, and the sum of
+e^T information e. Our error is a tangent in another frame (docs/conventions.md), the same to first order.
 """
 
 import re
@@ -16,7 +16,7 @@ RELATIVE_TOLERANCE = 1e-4  # second order terms of errors of centimetres
 
 
 def multiply(a, b):
-    """Of quaternions (x, y, z, w)."""
+    """Product of two quaternions (x, y, z, w)."""
     ax, ay, az, aw = a
     bx, by, bz, bw = b
     return (aw * bx + ax * bw + ay * bz - az * by, aw * by - ax * bz + ay * bw + az * bx,
@@ -48,7 +48,7 @@ def edge_cost(Z, T_i, T_j, upper):
     t, q = compose(inverse(Z), compose(inverse(T_i), T_j))
     sign = -1 if q[3] < 0 else 1
     error = (*t, *(sign * x for x in q[:3]))
-    entries = iter(map(float, upper))  # of the information's upper triangle, row by row
+    entries = iter(map(float, upper))  # the information's upper triangle, row by row
     return sum((1 if row == column else 2) * next(entries) * error[row] * error[column]
                for row in range(6) for column in range(row, 6))
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""pangea-vio that is held up: in real time it drops images and says so, at --rate max it drops none.
+"""Tests a delayed pangea-vio: in real time it drops images and reports it, at --rate max it drops none.
 
 lag_test.py BIN RECORDING WORK
 """
@@ -16,7 +16,7 @@ MAX_LAG_S = 1
 
 
 def run(programs, recording, tum, rate):
-    """poses, stderr, seconds; stopped for a while in the middle."""
+    """Returns poses, stderr and seconds; the program is stopped for a while in the middle."""
     begin = time.monotonic()
     vio = subprocess.Popen([programs / "pangea-vio", "--agent", "1", "--bus", "none", "--recording", recording, "--rate", rate,
                             "--duration", "10", "--out-tum", tum], stderr=subprocess.PIPE, text=True)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A session of live agents as a user runs it: one hears examples/sensor_source until Ctrl-C, one has no sensors and a duration.
+"""Tests a session of live agents as a user runs it: one reads examples/sensor_source until Ctrl-C, one has no sensors and a duration.
 PYTHONPATH has pangea-python.
 
 live_session_test.py BIN RECORDING WORK

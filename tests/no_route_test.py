@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""On a machine without a multicast route a program says one thing, what to do: no_route_test.py BIN"""
+"""Tests that on a machine without a multicast route a program prints a single message, with a remedy: no_route_test.py BIN"""
 
 import subprocess
 import sys
@@ -9,7 +9,7 @@ SKIPPED = 77
 WITHOUT_NETWORK = ["unshare", "--user", "--map-root-user", "--net"]
 
 if subprocess.run([*WITHOUT_NETWORK, "true"], capture_output=True).returncode != 0:
-    sys.exit(SKIPPED)  # namespaces are forbidden here
+    sys.exit(SKIPPED)  # namespaces are not permitted here
 done = subprocess.run([*WITHOUT_NETWORK, Path(sys.argv[1]) / "pangea-fusion"], capture_output=True, text=True, timeout=20)
 print(done.stderr)
 assert done.returncode == 1, done.returncode

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A type's name is defined once in a namespace: two definitions in one program are undefined behaviour that no compiler reports."""
+"""A type's name must be defined only once in a namespace: two definitions in one program are undefined behaviour that no compiler reports."""
 
 import collections
 import re
@@ -12,7 +12,7 @@ TYPE = re.compile(r"(?:class|struct|enum class|enum) (\w+)(?: final)?(?: :[^;]*)
 
 
 def definitions(text):
-    """(namespace, name) of what a header defines outside of other types."""
+    """(namespace, name) of each type that a header defines outside of other types."""
     namespace = ""
     for line in text.splitlines():
         if begin := NAMESPACE.match(line):

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""pangea-python against LCM itself: every type, the keyword, short messages and fragments both ways. PYTHONPATH has the package."""
+"""Tests pangea-python against LCM itself: every type, the keyword, short messages and fragments in both directions. PYTHONPATH has the package."""
 
 import importlib
 import os
@@ -28,7 +28,7 @@ def log_events(data):
 
 
 def sizes():
-    """Around the limits of a datagram, and far beyond."""
+    """Sizes around the limits of a datagram, and far beyond."""
     return [1, 65490, 65491, 65492, 65493, 70000, 131000, 500000]
 
 
@@ -42,7 +42,7 @@ class Python(unittest.TestCase):
     def receive(self, channels, count, message_type=None):
         got = []
         self.bus.subscribe(channels, lambda channel, message: got.append((channel, message)), message_type)
-        yield  # what is subscribed to may come now
+        yield  # from here on the subscribed messages may come
         deadline = time.monotonic() + 20
         while len(got) < count and time.monotonic() < deadline:
             self.bus.handle(0.2)
@@ -95,7 +95,7 @@ class Python(unittest.TestCase):
             time.sleep(1)
             for channel, data in sent:
                 self.bus.publish(channel, data)
-                time.sleep(0.05)  # its queue is 30 messages deep
+                time.sleep(0.05)  # the logger's queue has only 30 messages
             time.sleep(1)
             logger.terminate()
             logger.wait(10)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""--help of what is started by hand says what it does and does nothing, however long the real run takes."""
+"""Tests that --help of each script that users start prints its purpose and does nothing else, even if the real run takes long."""
 
 import subprocess
 import unittest
@@ -23,7 +23,7 @@ class ScriptsHelp(unittest.TestCase):
         for path in scripts():
             with self.subTest(path.name):
                 text = path.read_text()
-                # Looked at before it is run: one without help would install packages, or build for half an hour.
+                # The text is checked before the script is run: one without help would install packages, or build for half an hour.
                 first = next(line for line in text.splitlines() if line and not line.startswith(("#", "set ")))
                 self.assertTrue("argparse" in text if "python" in text.splitlines()[0] else first.endswith('scripts/usage"')
                                 or first == '. "$(dirname "$0")/usage"', f"{path}: no --help")

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""examples/sensor_source as a user runs it: a recording in real time into pangea-vio --live. PYTHONPATH has pangea-python.
+"""Tests examples/sensor_source as a user runs it: a recording in real time into pangea-vio --live. PYTHONPATH has pangea-python.
 
 sensor_source_test.py BIN RECORDING WORK
 """

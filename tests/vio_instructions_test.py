@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""What the odometry costs: its instructions on a short rendered recording, counted by valgrind, against a number that is committed.
+"""Tests the odometry's cost: valgrind counts its instructions on a short rendered recording, which are compared with a committed number.
 
     tests/vio_instructions_test.py PANGEA_VIO RECORDING [--print]
 
-Without decoding and start of the program. Fails from 5 % more on, and from 5 % less on: then the number below is lowered. Skipped (77)
-without valgrind, with libraries other than those that it was counted with, and on a processor without AVX2.
+Decoding and the program's start are not counted. Fails above +5 %, and below -5 %: then the number below must be lowered. Skipped (77)
+without valgrind, with other libraries than those of the committed number, and on a processor without AVX2.
 """
 
 import os
@@ -15,11 +15,11 @@ import sys
 import tempfile
 from pathlib import Path
 
-MILLIONS = 3666  # of instructions, 6 s at 20 images a second
+MILLIONS = 3666  # instructions, for 6 s at 20 images per second
 TOLERANCE = 0.05
 COUNTED_WITH = "libopencv_video.so.406"
 SECONDS = 6
-# The same machine code on every processor with AVX2, which vio/vector_clones.h uses: without AVX in OpenCV and in the C library.
+# Gives the same machine code on every processor with AVX2, which vio/vector_clones.h uses: no AVX in OpenCV and in the C library.
 PLAIN = {"OPENCV_CPU_DISABLE": "AVX,FP16,AVX2,FMA3,AVX512-COMMON,AVX512-SKX",
          "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX,-AVX2,-FMA,-FMA4,-AVX2_Usable,-FMA_Usable,-ERMS"}
 

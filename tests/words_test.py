@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""One word for one thing, the field's: the words that this project once invented stand nowhere any more. And few of them."""
+"""Tests that each thing has one word, that of the field: words that this project once invented must not be used. Also limits the words."""
 
 import re
 import unittest
@@ -7,7 +7,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 
-# What the words stood for is said beside them; capitals count.
+# Each old word stands beside the words to use instead; capitals count.
 WORDS = [
     (r"(?i)verdict", "verification result"),
     (r"\b[Jj]udg(e[sd]?|ing|ements?)\b|[a-z]Judg|judge_", "(loop) verifier, to verify"),
@@ -35,12 +35,12 @@ WORDS = [
     (r"\bmin_\w*looks|\bLooks\(|DifferentLook|\blook_(angle|distance)", "viewpoint"),
 ]
 
-# What has been shipped keeps its name: logs and programs of others have it.
+# Released names stay as they are: existing logs and other programs contain them.
 FROZEN = [
     r"verdict_request(_t)?\b", r"\bnum_verdicts\b", r"VERDICT_REQUEST", r"\bagain_t\b", r"AGAIN_", r"kAgainPrefix",
-    r"the surroundings contradict",  # constraint_t.reason in every log there is
+    r"the surroundings contradict",  # a constraint_t.reason in existing logs
 ]
-# A word of the table that means something else there.
+# Words of the table that have another meaning in these files.
 ALLOWED = {
     "modules/report/html/report_script.cc": [r"\bfigure\b"],  # the HTML element
     "modules/report/html/report_svg.h": [r"\bfigure\b"],
@@ -68,20 +68,20 @@ def without(text, expressions):
 
 
 def found(roots, suffixes):
-    """Every word of the table: file:line: the word, and what to say."""
+    """Each word of the table that is found: file:line: the word, and its replacement."""
     out = []
     words = [(re.compile(expression), say) for expression, say in WORDS]
     for name, file in files(roots, suffixes):
         try:
             text = without(file.read_text(), FROZEN + ALLOWED.get(name, []))
         except UnicodeDecodeError:
-            continue  # no text
+            continue  # not a text file
         for word, say in words:
             out += [f"{name}:{text.count(chr(10), 0, hit.start()) + 1}: '{hit.group(0)}': say {say}" for hit in word.finditer(text)]
     return sorted(out)
 
 
-# At most so many words, a table's lines not counted, or lists would take their place: what a reader takes in at one sitting, and what fits a page.
+# Largest numbers of words, without tables' lines, or lists would replace them: what one can read at one sitting, or what fits on a page.
 LONGEST = {"README.md": 900, "bench/README.md": 2800, "docs/decisions/*.md": 420}
 ALL_PAGES = ["README.md", "docs/*.md", "docs/decisions/*.md", "bench/README.md", "lcmtypes/README.md", "logs/README.md"]
 MOST_WORDS = 21200

@@ -1,4 +1,4 @@
-"""The jobs of the ladder: render each scene's images, put each rung's recording together, run VIO on it."""
+"""The jobs of the ladder: render the images of each scene, compose the recording of each rung, run VIO on it."""
 
 import sys
 from dataclasses import dataclass
@@ -16,11 +16,11 @@ RPE_DISTANCE_M = 5
 @dataclass(frozen=True)
 class Scene:
     name: str
-    seconds: float  # of its beginning
-    sequence: str | None  # the EuRoC flight it follows; none: a generated walk
+    seconds: float  # length, from the beginning
+    sequence: str | None  # the EuRoC flight that it follows; None: a generated walk
 
 
-# MH_01 stands on the floor from 10 to 40 s, so more of it.
+# MH_01 is stationary on the floor from 10 to 40 s, so a longer part is used.
 SCENES = [Scene("MH_01", 75, "MH_01"), Scene("MH_03", 45, "MH_03"), Scene("walk", 45, None)]
 
 
@@ -43,7 +43,7 @@ class Plan:
         for scene in self.scenes():
             exact = self._render(scene, "perfect", 1, ["--perfect", "--tracks"])
             for rung in self.rungs(scene):
-                # Where there is nothing to draw one seed says it all.
+                # Without random draws one seed is enough.
                 seeds = self.options.seeds if rung.given.seeded else self.options.seeds[:1]
                 runs = {seed: self._run(scene, rung, seed, exact) for seed in seeds}
                 self.runs[scene.name, rung.name] = runs
@@ -100,7 +100,7 @@ class Plan:
     def _path(self, scene):
         if not scene.sequence:
             return ["--generate", "walk"]
-        # The hall of bench/accuracy, so that its frames serve here too.
+        # The hall is that of bench/accuracy, so that the frames of both are shared.
         paths = {s: str(only(Path(self.options.groundtruth).resolve(), f"{s}*.csv")) for s in anchors.SEQUENCES}
         return ["--path", paths[scene.sequence], "--keep-clear", *paths.values()]
 

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Makes a recording of parts of others: images of one, and an exact one's IMU and calibration, made worse as asked.
+"""Composes a recording from others: images of one, IMU and calibration of an exact one, with the requested errors.
 
-White noise and walking biases are those of the exact recording's sensor.yaml, with the simulator's turn-on biases. A wrong
-calibration is off by a fixed size in a direction of the seed's own.
+White noise and random walks of the biases have the sigmas of the exact recording's sensor.yaml; turn-on biases are the simulator's. A
+wrong calibration has an error of fixed size, in a direction that depends on the seed.
 """
 
 import argparse
@@ -32,7 +32,7 @@ def put(text, key, values):
 
 
 def worse_imu(rows, yaml, noise, bias, seed):
-    """Rows of stamp and six numbers. The draws of noise and of bias are the same whether or not the other is asked for."""
+    """Rows of stamp and six numbers. The draws of noise and of bias do not depend on whether the other is requested."""
     rate, gyro_noise, gyro_walk, accel_noise, accel_walk = (numbers(yaml, key) for key in IMU_KEYS)
     white, walk = random.Random(f"noise {seed}"), random.Random(f"bias {seed}")
     biases = [walk.gauss(0, turn_on) for turn_on in 3 * [GYRO_TURN_ON] + 3 * [ACCEL_TURN_ON]]
@@ -54,7 +54,7 @@ def direction(rng):
 
 
 def rotated(matrix, axis, angle):
-    """Rodrigues: the rotation in a row-major 4x4, rotated from its left."""
+    """The rotation of a row-major 4x4 matrix, rotated from the left by Rodrigues' formula."""
     c, s = math.cos(angle), math.sin(angle)
     x, y, z = axis
     rotation = [[c + x * x * (1 - c), x * y * (1 - c) - z * s, x * z * (1 - c) + y * s],

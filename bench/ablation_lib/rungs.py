@@ -1,7 +1,7 @@
-"""What the odometry is given: everything exact, then one thing after the other as a real sensor gives it.
+"""The input of the odometry at each rung: everything exact, then one error of a real sensor after the other.
 
-A rung of the ladder keeps what the rungs above it took away. Beside the ladder stand IMU and calibration, which show without
-the tracker: each of their errors alone, all else exact.
+A rung of the ladder keeps the errors of the rungs above it. Errors of IMU and calibration are also tested beside the ladder, without
+the tracker: each error alone, with everything else exact.
 """
 
 from dataclasses import dataclass, replace
@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 
 @dataclass(frozen=True)
 class Given:
-    tracks: str = "exact"  # or followed: by the odometry's own tracker
+    tracks: str = "exact"  # or followed: tracked by the odometry's own tracker
     images: str = "perfect"  # or noisy: exposure changes and pixel noise; or full: motion blur as well
     imu_noise: bool = False
     imu_bias: bool = False
-    imu_recorded: bool = False  # EuRoC's own, and images rendered at its camera's stamps
-    calibration: tuple = ()  # what is wrong of CALIBRATION
+    imu_recorded: bool = False  # EuRoC's own samples, with images rendered at the stamps of its camera
+    calibration: tuple = ()  # the wrong parts of CALIBRATION
 
     @property
     def seeded(self):
@@ -23,7 +23,7 @@ class Given:
 
 @dataclass(frozen=True)
 class Rung:
-    name: str  # of its products
+    name: str  # used in the names of its products
     title: str
     given: Given
 
@@ -50,5 +50,5 @@ def _ladder():
 
 LADDER = list(_ladder())
 ALONE = [Rung("only_" + name, title, replace(Given(), **change)) for name, title, change in _IMU + _OFF]
-# The real thing: a recorded IMU beside images with noise and blur, calibration exact.
+# The real case: a recorded IMU with images that have noise and blur; the calibration is exact.
 RECORDED = Rung("imu_recorded", "recorded IMU, exact calibration", Given(tracks="followed", images="full", imu_recorded=True))

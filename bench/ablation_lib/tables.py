@@ -1,4 +1,4 @@
-"""What the rungs came to: a table a scene and one picture."""
+"""The results of the rungs: a table per scene, and one picture."""
 
 import statistics
 import subprocess
@@ -14,10 +14,10 @@ COLOURS = ("#0072b2", "#d55e00", "#009e73")
 
 @dataclass
 class Metrics:
-    """Of one run; None where there is none."""
+    """Metrics of one run; None for a missing one."""
 
     ate_m: float
-    median_m: float  # of the same errors: not moved by the first seconds, when a start has yet to settle
+    median_m: float  # of the same errors; it is not affected by the first seconds, in which a start settles
     rpe_m: float
     rpe_deg: float
     counts: bool  # one map over the whole recording
@@ -29,7 +29,7 @@ def metrics_of(job):
         return None
     own = ate["SE(3)"]["trajectories"][0]
     row = rpe["over_distance"][0]
-    if not row["position_m"]:  # lost before the first stretch was over
+    if not row["position_m"]:  # lost before the end of the first part
         return None
     coverage = own["coverage"] or 0
     one_map = len(list(job.folder.glob("vio.tum*"))) == 1
@@ -78,7 +78,7 @@ class Tables:
                 for (scene, rung), runs in self.metrics.items()}
 
     def picture(self, path):
-        """ATE down the ladder, a line a scene, the seeds' spread as bars; drawn by gnuplot."""
+        """ATE down the ladder, with a line per scene and the seeds' spread as bars; drawn by gnuplot."""
         rungs = LADDER + [RECORDED]
         script = ["set terminal pngcairo noenhanced size 1400,800 font 'sans,14' background '#ffffff'", f"set output '{path}'",
                   "set ylabel 'ATE, mm'", "set logscale y", "set yrange [*:*]", "set grid ytics linecolor '#dddddd'",
@@ -91,7 +91,7 @@ class Tables:
             for i, rung in enumerate(rungs):
                 values = [1e3 * run.ate_m for run in self.metrics.get((scene.name, rung.name), []) if run]
                 if values:
-                    # The last rung stands beside the ladder: no line leads to it.
+                    # The last rung is not on the ladder, so no line leads to it.
                     gap = [""] if rung is RECORDED else []
                     rows += gap + [f"{i + 0.08 * (number - 1):.2f} {statistics.median(values)} {min(values)} {max(values)}"]
             if not rows:

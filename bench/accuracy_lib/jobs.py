@@ -1,8 +1,8 @@
-"""Jobs that make products, each a folder, run when they are missing or no longer what would be made.
+"""Jobs that make products. A product is a folder; it is made if it is missing or out of date.
 
-A product is made in `<folder>.part` and renamed when all its commands have succeeded; `job.json` in it holds the key of
-what made it: the commands and the digests of the products they read. So a run may be stopped at any time, and the next one
-goes on from there. A product made by another build of a program is kept, but counted (`stale`).
+A product is made in `<folder>.part` and renamed when all its commands have succeeded; its `job.json` contains the key of
+its inputs: the commands, and the digests of the products that they read. So a run may be stopped at any time, and the next one
+continues from there. A product that was made by another build of a program is kept, but counted (`stale`).
 """
 
 import functools
@@ -24,7 +24,7 @@ def _digest_of_version(path, size, mtime_ns):
 
 
 def file_digest(path):
-    """Read again only when the file has changed."""
+    """Reads the file again only if it has changed."""
     stat = Path(path).stat()
     return _digest_of_version(path, stat.st_size, stat.st_mtime_ns)
 
@@ -42,10 +42,10 @@ class Job:
     folder: Path
     commands: list
     needs: list = field(default_factory=list)
-    main_product: str = ""  # the file that dependents read; empty: the key stands for it
+    main_product: str = ""  # the file that dependents read; empty: the key is used as the digest
     files: dict = field(default_factory=dict)  # name -> text, written before the commands run
-    outside: list = field(default_factory=list)  # files read that no job made
-    alone: bool = False  # uses all processors itself
+    outside: list = field(default_factory=list)  # files that the commands read and no job makes
+    alone: bool = False  # the job itself uses all processors
     state: str = "waiting"  # then wanted, running, and done, kept, failed or skipped
 
     @property
@@ -59,7 +59,7 @@ class Job:
             return {}
 
     def key(self):
-        """Of what would be made now; the products needed must be there. Independent of where the programs are."""
+        """Key of the product as it would be made now; the needed products must exist. It does not depend on the folder of the programs."""
         commands = [[Path(c.argv[0]).name, *c.argv[1:]] for c in self.commands]
         outside = [[str(p), file_digest(p)] for p in self.outside]
         text = json.dumps([commands, outside, sorted(self.files.items()), [n.digest() for n in self.needs]])
@@ -78,7 +78,7 @@ class Job:
         return self.record().get("key") == self.key()
 
     def stale(self):
-        """Made by another build of the program than the one at hand."""
+        """Whether the product was made by another build of the program than the present one."""
         made_by, at_hand = self.record().get("program"), self.program()
         return None not in (made_by, at_hand) and made_by != at_hand
 
@@ -93,7 +93,7 @@ class Job:
 
 
 class Running:
-    """A job's commands, one after the other, in a child process at a time."""
+    """Runs a job's commands one after the other, each in a child process."""
 
     def __init__(self, job, log):
         self.job = job
@@ -121,7 +121,7 @@ class Running:
         self.child = subprocess.Popen(argv, stdin=subprocess.DEVNULL, stdout=self.output, stderr=subprocess.STDOUT)
 
     def poll(self):
-        """Done or failed; None while it runs."""
+        """"done" or "failed"; None while the job runs."""
         code = self.child.poll()
         if code is None:
             return None
@@ -142,14 +142,14 @@ class Running:
 
 
 class Runner:
-    """Runs what is not fresh, up to `slots` jobs at a time, one that wants all processors alone."""
+    """Runs the jobs that are not fresh, up to `slots` at a time; a job that needs all processors runs alone."""
 
     def __init__(self, jobs, slots, log_folder, redo=(), after=lambda job: None):
         self.jobs = jobs
         self.slots = slots
         self.log_folder = log_folder
         self.redo = set(redo)
-        self.after = after  # called when a job ended well
+        self.after = after  # called when a job has succeeded
         self.running = []
         self.begin = time.monotonic()
 

@@ -1,4 +1,4 @@
-"""What was measured: samples over seeds, whether each counts and why not, and their median."""
+"""Measured values: samples over seeds, whether each counts and the reason if not, and their median."""
 
 import json
 import math
@@ -17,8 +17,8 @@ def read_json(path):
 
 @dataclass
 class Sample:
-    value: float | None = None  # metres; None: there is no value
-    reasons: list = field(default_factory=list)  # why it does not count
+    value: float | None = None  # metres; None: unknown
+    reasons: list = field(default_factory=list)  # reasons for which the value does not count
 
     @property
     def counts(self):
@@ -33,7 +33,7 @@ class Series:
         self.samples = samples  # seed (or any label): Sample
 
     def median(self):
-        """Of all seeds, one that does not count as bad as can be; None when there is none or too few count."""
+        """Median of all seeds; a seed that does not count is infinitely bad. None without seeds, or if too few count."""
         if not self.samples:
             return None
         median = statistics.median(s.value if s.counts else math.inf for s in self.samples.values())
@@ -86,7 +86,7 @@ class Measured:
         return Sample(own["ate_m"]["rmse"], _uncounted({"coverage": own["coverage"], "map_ids": range(maps)}))
 
     def part(self, where, name, agent_id):
-        """VIO over one half, from the keyframes: the coverage is that of the half."""
+        """VIO on one half, from the keyframes; the coverage is relative to the half."""
         report = self.report(where, name)
         return self._of_agent(report, agent_id, "ate_vio_m")
 
@@ -99,7 +99,7 @@ class Measured:
         return Sample(ate["Sim(3)"]["ate_m"]["rmse"] if ate and sample.value is not None else None, sample.reasons)
 
     def joint(self, where, name):
-        """All agents of a server run with one alignment; a value only when they are in one map."""
+        """All agents of a server run with one alignment; there is a value only if they are in one map."""
         report = self.report(where, name)
         if report is None:
             return Sample(None, ["no value"])

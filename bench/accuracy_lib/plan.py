@@ -1,7 +1,7 @@
-"""Which jobs the tables take: render each recording, VIO once per recording and half, the server on the stored keyframes.
+"""The jobs for the tables: render each recording, run VIO once per recording and half, run the server on the stored keyframes.
 
-An agent's id goes with its sequence (MH_03: 3) and its half (A: 1, B: 2), so that one log serves every pair and both orders:
-a replay takes the map that is first in its list of logs as the oldest, in whose frame a group lives.
+An agent's id depends on its sequence (MH_03: 3) and its half (A: 1, B: 2), so that one log serves every pair and both orders:
+a replay takes the first map in its list of logs as the oldest one, which defines the group's frame.
 """
 
 import json
@@ -13,12 +13,12 @@ from pathlib import Path
 from accuracy_lib import anchors
 from accuracy_lib.jobs import OUT, Command, Job, Runner
 
-MAP_UTIME = "1000000"  # maps are told apart by their agent
+MAP_UTIME = "1000000"  # maps are distinguished by their agents
 REPOSITORY = Path(__file__).resolve().parents[2]
 
 
 class RenderJob(Job):
-    """Kept while its images are there, or while nobody needs them."""
+    """The recording is kept while it has its images, or while no other job needs them."""
 
     def __init__(self, *args, **kwargs):
         super().__init__(*args, **kwargs)
@@ -29,7 +29,7 @@ class RenderJob(Job):
         return (self.folder / "mav0/cam0/data").glob("*.png")
 
     def fresh(self):
-        if not self.record() and self._complete():  # rendered by hand
+        if not self.record() and self._complete():  # it was rendered by hand
             (self.folder / "job.json").write_text(json.dumps({"key": self.key()}) + "\n")
         if self.record().get("key") != self.key():
             return False
@@ -42,7 +42,7 @@ class RenderJob(Job):
             files = [(camera / "data" / row.split(",")[1].strip()).stat() for row in rows]
         except (OSError, IndexError):
             return False
-        quiet_s = 10  # nobody is writing it
+        quiet_s = 10  # no process is writing it any more
         return all(f.st_size > 0 for f in files) and max(f.st_mtime for f in files) < time.time() - quiet_s
 
     def drop_images(self):
@@ -52,7 +52,7 @@ class RenderJob(Job):
 
 @dataclass
 class Agent:
-    """One VIO run: what a server run reads, and what its metrics are compared with."""
+    """One VIO run: the input of a server run, and the reference for its metrics."""
 
     id: int
     name: str
@@ -137,7 +137,7 @@ class Plan:
         self._server("real", name, [agent])
 
     def _split(self, sequence):
-        """Where the recording is cut, s, as the sessions of Table III do."""
+        """The time, s, at which the recording is cut, as in the sessions of Table III."""
         if self.options.seconds:
             return self.options.seconds / 2
         text = (REPOSITORY / f"sessions/table3_{sequence}_AB.yaml").read_text()
@@ -163,7 +163,7 @@ class Plan:
         argv += ["--start", f"{start:g}"] if start else []
         argv += ["--duration", f"{duration:g}"] if duration else []
         evaluate = self._eval("ate", [f"{OUT}/vio.tum", str(recording)])
-        # What the replay of these keyframes reads: which part of which recording they are.
+        # Read by the replay of these keyframes: the recording, and the part of it.
         run = {"id": agent, "recording": str(recording), "start": start, "duration": duration}
         job = Job("vio", f"{where} {name}", self.work / "vio" / where / name, [Command(argv), evaluate],
                   needs=[render] if render else [], main_product="keyframes.lcm",
@@ -191,7 +191,7 @@ class Plan:
 
 
 def run(jobs, options, logs):
-    """Makes what is missing, and drops images that all have seen if that is wanted; with --tables-only it only looks."""
+    """Makes the missing products, and drops images after their last use if requested; with --tables-only it only checks what exists."""
     if options.tables_only:
         for job in jobs:
             job.state = "kept" if job.kind == "render" or job.record() else "missing"

@@ -44,7 +44,7 @@ class Tables:
     def failed_bars(self):
         return [v.text for v in self.checks if v.bar and not v.passed]
 
-    # One value for each seed.
+    # One value per seed.
     def _series(self, what, of_seed):
         return Series(what, {f"seed {seed}": of_seed(seed) for seed in self.seeds})
 
@@ -64,7 +64,7 @@ class Tables:
         return sum(self.measured.fused(f"{prefix}{seed}", name) for seed in self.seeds)
 
     def _table(self, key, title, header, rows, series):
-        """`series`: row name -> {column: Series}; their remarks go under the table."""
+        """`series`: row name -> {column: Series}; the remarks of the series are listed below the table."""
         self.lines += [f"## {title}", "", "| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
         self.lines += ["| " + " | ".join(row) + " |" for row in rows]
         every = [s for columns in series.values() for s in columns.values()]
@@ -79,7 +79,7 @@ class Tables:
         self.checks.append(Check(text, bool(passed), False))
 
     def _most(self, text, passes):
-        """All but one of the five sequences; all of fewer."""
+        """The bar: all but one of the five sequences must pass; of fewer sequences all must."""
         needed = len(passes) - (1 if len(passes) == len(anchors.SEQUENCES) else 0)
         self._bar(f"{text}: {sum(passes)} of {len(passes)}, {needed} needed", sum(passes) >= needed)
 

@@ -1,21 +1,21 @@
-"""The sessions: two agents, anchors spread over agent 1's image and time, and what goes wrong."""
+"""The sessions: two agents, anchors spread over agent 1's image and time, and the faults."""
 
 import json
 import re
 
 from real_lib.plan import seconds
 
-# What each session suffers.
+# The faults of each session.
 CONDITIONS = ("good", "lossy", "killed", "next_day")
 # The server's processes that are killed in turn, ten times.
 KILLED = ["anchors", "agent_handler", "posegraph", "fusion", "place_recognition"] * 2
 LOSSY = {"loss": 0.2, "delay_ms": 2000}
 
-# Where in the image, as shares of its width and height: what people tap on.
+# Places in the image at which people tap, as shares of its width and height.
 SPOTS = [(0.5, 0.5), (0.35, 0.6), (0.65, 0.45), (0.5, 0.7), (0.6, 0.6)]
-# When: after the start-up, and early enough to reach the other while it walks, also where keyframes are 20 s late.
+# Times after the start-up, and early enough to reach agent 2 while it walks, even if keyframes are 20 s late.
 FIRST_S, LAST = 6, 0.6
-LAST_KEYFRAME_S = 1  # an anchor is placed when the next keyframe has come
+LAST_KEYFRAME_S = 1  # an anchor is placed when the next keyframe has arrived
 
 
 def image_size(recording):
@@ -26,7 +26,7 @@ def image_size(recording):
 
 
 def anchors(count, times, size):
-    """Spread over these seconds of agent 1's recording, and over its image."""
+    """Anchors spread over these seconds of agent 1's recording, and over its image."""
     return [{"agent": 1, "at": round(times[i * (len(times) - 1) // max(count - 1, 1)], 3), "name": f"anchor_{i + 1}",
              "pixel": [round(share * length) for share, length in zip(SPOTS[i % len(SPOTS)], size)]}
             for i in range(count)]
@@ -37,7 +37,7 @@ def evenly(begin, end, count):
 
 
 def two_recordings(options):
-    """The agents; when agent 1 places anchors."""
+    """The agents, and the times at which agent 1 places anchors."""
     first, second = (str(recording.resolve()) for recording in options.recordings)
     agents = [{"id": 1, "recording": first, "duration": options.seconds},
               {"id": 2, "recording": second, "duration": options.seconds, "delay": 3}]
@@ -53,7 +53,7 @@ def next_day_yaml(options):
 
 
 def cut_in_two(options, truth):
-    """One recording: agent 2 has the second part, when agent 1 has ended. Anchors are placed at images whose pose is known."""
+    """One recording: agent 2 plays the second part after agent 1 has ended. Anchors are placed at images with known poses."""
     recording, length = options.recordings[0], seconds(options.recordings[0])
     cut = options.cut or length / 2
     (begin, end), (again, last) = [(cut, length), (0, cut)] if options.swap else [(0, cut), (cut, length)]
@@ -66,7 +66,7 @@ def cut_in_two(options, truth):
 
 
 def session_yaml(condition, options, truth=None):
-    """A session file; JSON is YAML. `truth`: of one recording that is cut in two, the seconds of images whose pose is known."""
+    """A session file; JSON is YAML. `truth`: for one recording that is cut in two, the seconds of images with known poses."""
     agents, times, length = two_recordings(options) if truth is None else cut_in_two(options, truth)
     for agent in agents:
         agent.update({"link": LOSSY} if condition == "lossy" else {})

@@ -1,4 +1,4 @@
-"""What a session's logs say of poses and anchors. An anchor is its (agent, created), a transform (q, p)."""
+"""Poses and anchors in a session's logs. An anchor is identified by (agent, created); a transform is (q, p)."""
 
 import struct
 from dataclasses import dataclass
@@ -8,10 +8,10 @@ from real_lib import rotations as rot
 
 
 class Reader:
-    """The fields of an LCM message, one after the other."""
+    """Reads the fields of an LCM message, one after the other."""
 
     def __init__(self, data):
-        self.data, self.at = data, 8  # behind the type's fingerprint
+        self.data, self.at = data, 8  # after the type's fingerprint
 
     def take(self, form):
         values = struct.unpack_from(">" + form, self.data, self.at)
@@ -29,7 +29,7 @@ class Reader:
 
 @dataclass
 class Frame:
-    """A tracked image, and what was shown with it."""
+    """A tracked image, and the anchors shown with it."""
 
     wall_us: int
     t: float  # seconds, of the image
@@ -52,7 +52,7 @@ def shown(data):
 
 
 def frames(log, agent):
-    """Those tracked, in the order of time."""
+    """The tracked images, in the order of time."""
     found, newest = [], (None, {})
     for wall_us, channel, data in events(log):
         if channel == f"SHOWN_ANCHORS_{agent}":
@@ -65,7 +65,7 @@ def frames(log, agent):
 
 
 def first_heard(log, agent):
-    """{anchor: T_odom_anchor}: where the agent's server first had it."""
+    """{anchor: T_odom_anchor} of the first pose that the agent received for each anchor."""
     found = {}
     for _, channel, data in events(log):
         if channel == f"ANCHOR_{agent}":
@@ -78,7 +78,7 @@ def first_heard(log, agent):
 
 
 def placings(log):
-    """{anchor: (seconds, T_odom_body)} of the first edit of each that was placed by an agent's pose."""
+    """{anchor: (seconds, T_odom_body)} of each anchor's first edit that an agent's pose placed."""
     found = {}
     for _, channel, data in events(log):
         if channel == "ANCHOR_EDIT":

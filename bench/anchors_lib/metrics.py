@@ -1,4 +1,4 @@
-"""What the sessions came to, from their report.json."""
+"""The results of the sessions, from their report.json."""
 
 import statistics
 
@@ -11,7 +11,7 @@ def was_shown(agent):
 
 
 def metrics(report, placed):
-    """Over all anchors as the other agent shows them: median and worst of each field."""
+    """Median and worst value of each field, over all anchors that the other agent shows."""
     anchors = report.get("anchors", [])
     seen = [agent for anchor in anchors for agent in anchor["agents"] if was_shown(agent)]
     names = [anchor["name"] for anchor in anchors]

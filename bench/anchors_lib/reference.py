@@ -1,8 +1,8 @@
-"""Where agent 2 shows agent 1's anchors, by known camera poses: ground truth in two sessions, or a reference up to scale, at few images.
+"""Errors of agent 1's anchors as agent 2 shows them, from known camera poses: ground truth of two sessions, or a reference up to scale.
 
-An anchor's place is its place in the camera that it was placed by, carried by these poses to agent 2's camera: T_cam2_cam1 p_cam1.
-Lengths of a reference are brought to the joint map's metres, so an error of the map's scale does not count. Best known is a place in
-view: the reference has matched the two images, or others near them. Elsewhere its own bend counts too.
+An anchor's true position is its position in the camera by which it was placed, moved by these poses to agent 2's camera: T_cam2_cam1 p_cam1.
+Lengths of a reference are scaled to the joint map's metres, so an error of the map's scale does not count. The most certain errors are those
+of anchors in view: the reference has matched the two images, or others near them. Elsewhere the reference's own deformation counts too.
 """
 
 import bisect
@@ -17,9 +17,9 @@ from real_lib import trajectory
 from real_lib.measure import measure
 from real_lib.plan import REFERENCE, begin
 
-SETTLED_S = 10  # as in the session's report, which counts from the fusion on
+SETTLED_S = 10  # as in the session's report, where it counts from the fusion
 WIDTH_PX = 640
-SAME_S = 1e-3  # a stamp of the reference and one of an image
+SAME_S = 1e-3  # largest difference between a stamp of the reference and that of its image
 
 
 def optimised(session, agent):
@@ -33,20 +33,20 @@ def optimised(session, agent):
 
 
 def in_metres(session, agents, pieces, T_body_cam):
-    """The pieces in the joint map's metres; None where that does not know their scale."""
+    """The pieces in the joint map's metres; None if the map does not determine their scale."""
     poses = sorted(pose for agent in agents for pose in optimised(session, agent))
     found = measure(trajectory.moved(poses, T_body_cam), pieces)
     return trajectory.grown(pieces, found["scale"]) if found else None
 
 
 def nearest(frames, stamps, t):
-    """The image of this stamp, or None."""
+    """The image with this stamp, or None."""
     i = bisect.bisect_left(stamps, t - SAME_S)
     return frames[i] if i < len(frames) and frames[i].t <= t + SAME_S else None
 
 
 def pose_at(pieces, t):
-    """(frame of the piece, T_ref_cam)."""
+    """(frame of the piece, T_ref_cam); None if the pieces have no pose at t."""
     for piece in pieces:
         if pose := trajectory.at(piece.poses, trajectory.stamps_of(piece.poses), t):
             return piece.frame, pose
@@ -54,7 +54,7 @@ def pose_at(pieces, t):
 
 
 def places(session, agent, pieces, T_body_cam):
-    """{anchor: (frame of the piece, p_ref)}."""
+    """{anchor: (frame of the piece, p_ref)}: the true position of each anchor."""
     heard = messages.first_heard(session / f"agent_{agent}.lcm", agent)
     found = {}
     for anchor, (t, T_odom_body) in messages.placings(session / "session.lcm").items():
@@ -66,7 +66,7 @@ def places(session, agent, pieces, T_body_cam):
 
 
 class Viewer:
-    """Agent 2's images that the reference has."""
+    """Agent 2's images with a pose in the reference."""
 
     def __init__(self, log, agent, pieces, T_body_cam, camera):
         self.camera = camera
@@ -84,17 +84,17 @@ class Viewer:
                     self.frames.append((frame, piece.frame, T_ref_cam, rot.inverse(rot.compose(frame.T_odom_body, T_body_cam))))
 
     def localised_s(self):
-        """Wall time from its first pose until it first shows an anchor."""
+        """Wall time from agent 2's first pose until it first shows an anchor."""
         return 1e-6 * (min(self.first_shown.values()) - self.tracked[0].wall_us) if self.first_shown else None
 
     def largest_jump_m(self, anchor):
-        """From an image to the next, in one map; None: it was never shown."""
+        """Largest step from an image to the next in one map; None if the anchor was never shown in two successive images."""
         steps = [math.dist(a.shown[anchor][1], b.shown[anchor][1]) for a, b in zip(self.tracked, self.tracked[1:])
                  if a.map == b.map and anchor in a.shown and anchor in b.shown]
         return max(steps, default=None)
 
     def errors(self, anchor, place):
-        """Of each image that it is shown with: (seconds since it was first shown, metres, metres from the camera, pixels in view)."""
+        """For each image with the anchor: (seconds since it was first shown, error in metres, metres from the camera, error in pixels if in view)."""
         frame_of_place, p_ref = place
         found = []
         for frame, frame_of_piece, T_ref_cam, T_cam_odom in self.frames:
@@ -107,7 +107,7 @@ class Viewer:
 
 
 class Camera:
-    """A pinhole: the lens's distortion is left out."""
+    """A pinhole camera, without the lens's distortion."""
 
     def __init__(self, size, intrinsics):
         self.size, self.focal, self.centre = size, intrinsics[:2], intrinsics[2:4]
@@ -116,7 +116,7 @@ class Camera:
         return tuple(f * x / p[2] + c for f, x, c in zip(self.focal, p, self.centre)) if p[2] > 0 else None
 
     def pixels(self, seen, truth):
-        """Between the two at WIDTH_PX wide; None where the truth is not in the image. What can be drawn nowhere is off by the diagonal."""
+        """Distance of the two for a width of WIDTH_PX; None if the truth is outside the image. If `seen` cannot be projected: the diagonal."""
         here, there = self.project(seen), self.project(truth)
         if not there or not all(0 <= u < length for u, length in zip(there, self.size)):
             return None
@@ -124,7 +124,7 @@ class Camera:
 
 
 class Recording:
-    """What its images were taken with."""
+    """Camera and extrinsics of a recording."""
 
     def __init__(self, recording):
         self.mav0 = mav0_of(recording)
@@ -135,7 +135,7 @@ class Recording:
 
 
 class Reference(Recording):
-    """Of one recording that is cut in two."""
+    """The reference of one recording that is cut in two."""
 
     def __init__(self, recording, file=None):
         super().__init__(recording)
@@ -147,11 +147,11 @@ class Reference(Recording):
         self.begin = begin(self.mav0)
 
     def seconds(self):
-        """Of the recording, of the images whose pose is known."""
+        """Seconds since the start of the recording, of the images with known poses."""
         return [t - self.begin for piece in self.pieces for t, _ in piece.poses]
 
     def fill(self, report, session):
-        """The errors into report.json's `anchors`, where the reference knows them."""
+        """Writes the errors into report.json's `anchors`, where the reference knows them."""
         pieces = in_metres(session, (1, 2), self.pieces, self.T_body_cam)
         if pieces:
             viewer = Viewer(session / "agent_2.lcm", 2, pieces, self.T_body_cam, self.camera)
@@ -159,7 +159,7 @@ class Reference(Recording):
 
 
 def fill_next_day(report, first, second, recordings):
-    """The errors of what agent 1 placed in the session `first`, whose report it is, and agent 2 shows in the session `second`."""
+    """Errors of the anchors that agent 1 placed in the session `first` and agent 2 shows in `second`; `report` is that of `first`."""
     maker, looker = map(Recording, recordings)
     viewer = Viewer(second / "agent_2.lcm", 2, ground_truth(looker), looker.T_body_cam, looker.camera)
     for anchor in report["anchors"]:
@@ -186,7 +186,7 @@ def fill(report, known, viewer):
 
 
 def summary(errors):
-    """As report.json says it, from SETTLED_S after the anchor was first shown on; and in view, at any time."""
+    """The fields of report.json: errors from SETTLED_S after the anchor was first shown; errors in view at any time."""
     found = {"shown": bool(errors)}
     settled = [metres for shown_s, metres, _, _ in errors if shown_s >= SETTLED_S]
     if settled:

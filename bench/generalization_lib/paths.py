@@ -1,6 +1,6 @@
-"""Ways that neither EuRoC nor the simulator's generator goes: standing still in between, turning about on the spot, driving.
+"""Paths with motions that neither EuRoC nor the simulator's generator has: pauses, rotations on the spot, driving.
 
-Each is a speed over time and, from the time and the metres gone, the camera's position, yaw, pitch and roll (z up, metres,
+Each path is a speed over time, and the camera's position, yaw, pitch and roll from the time and the distance covered (z up, metres,
 radians). Written as TUM poses of the body behind EuRoC's cam0.
 """
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Callable
 
 RATE_HZ = 40
-SUBSTEPS = 25  # of the speed's integral, between two poses
+SUBSTEPS = 25  # steps of the speed's integral between two poses
 # EuRoC's cam0, as all extrinsics: rows of the rotation of T_body_cam, and its translation.
 R_BODY_CAM = ((0.0148655429818, -0.999880929698, 0.00414029679422), (0.999557249008, 0.0149672133247, 0.025715529948),
               (-0.0257744366974, 0.00375618835797, 0.999660727178))
@@ -18,7 +18,7 @@ EUROC = (R_BODY_CAM, P_BODY_CAM)
 
 
 def smooth(x):
-    """0 to 1 over 0 .. 1, with no speed and acceleration at both ends."""
+    """Smooth step from 0 to 1 over 0 .. 1, without speed and acceleration at both ends."""
     x = min(1.0, max(0.0, x))
     return x * x * x * (x * (6 * x - 15) + 10)
 
@@ -28,7 +28,7 @@ def within(t, begin, end, soft=0.8):
 
 
 def eight(s):
-    """Position on a figure of eight after s of its lengths, and where it leads."""
+    """Position on a figure of eight at arc length s, and the direction there."""
     phase = s / 2.2
     return 2.0 * math.sin(phase), 0.9 * math.sin(2 * phase), math.atan2(1.8 * math.cos(2 * phase), 2.0 * math.cos(phase))
 
@@ -45,14 +45,14 @@ def driver(t, s):
 
 @dataclass(frozen=True)
 class Way:
-    speed: Callable  # m/s, of the time
-    camera: Callable  # position, yaw, pitch, roll, of the time and the metres gone
+    speed: Callable  # m/s, as a function of time
+    camera: Callable  # position, yaw, pitch, roll, from the time and the metres covered
 
 
 WAYS = {
-    # Stops for 8 s and for 14 s; a hand goes on trembling only while it walks.
+    # Stops for 8 s and for 14 s; the hand trembles only while it walks.
     "stands": Way(lambda t: 0.8 * (1 - within(t, 9, 17) - within(t, 26, 40)), lambda t, s: walker(s / 0.8, s)),
-    # Stands and turns twice about itself in 16 s.
+    # Stands on the spot and rotates twice in 16 s.
     "turns": Way(lambda t: 0.8 * (1 - within(t, 10, 26)), lambda t, s: walker(t, s, 4 * math.pi * smooth((t - 10) / 16))),
     "drives": Way(lambda t: 5 * smooth(t / 6), driver),
 }
@@ -63,7 +63,7 @@ def product(a, b):
 
 
 def body_pose(position, yaw, pitch, roll, extrinsics=EUROC):
-    """Rotation and position of the body whose camera is there and looks along yaw and pitch."""
+    """Rotation and position of the body for a camera at this position with this yaw, pitch and roll."""
     R_body_cam, p_body_cam = extrinsics
     (cy, sy), (cp, sp), (cr, sr) = ((math.cos(a), math.sin(a)) for a in (yaw, pitch, roll))
     level = [[0, 0, 1], [-1, 0, 0], [0, -1, 0]]  # looks along x

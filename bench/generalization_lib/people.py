@@ -1,6 +1,6 @@
-"""People who walk past a camera in step, painted into rendered images: textured boards that stand upright in the world.
+"""People who walk side by side past a camera, painted into rendered images as textured boards that stand upright in the world.
 
-They cross the view from left to right where the camera is in the middle of a passage, as the ground truth has it. EuRoC's camera.
+They cross the view from left to right of the ground-truth camera in the middle of a passage. The camera is EuRoC's.
 """
 
 import math
@@ -12,21 +12,21 @@ from real_lib import rotations as rot
 from real_lib import trajectory
 
 SPEED_MPS = 1.2
-WIDTH_M, HEIGHT_M, EYES_M = 0.55, 1.75, 1.5  # the camera is where eyes are
+WIDTH_M, HEIGHT_M, EYES_M = 0.55, 1.75, 1.5  # the camera is at the height of the eyes
 NEAREST_M, FURTHEST_M = 2.0, 3.2
-COLUMNS, ROWS = 16, 48  # of a person's clothes, in patches of one grey
+COLUMNS, ROWS = 16, 48  # patches of a person's clothes, each of one grey
 
 
 @dataclass
 class Person:
     ahead_m: float
-    right_m: float  # in the middle of the passage
+    right_m: float  # position in the middle of the passage
     clothes: list  # rows of greys
 
 
 @dataclass
 class Passage:
-    """From one second to another one."""
+    """Part of the recording, in seconds, in which people pass."""
 
     begin: float
     end: float
@@ -37,12 +37,12 @@ class Passage:
 
 
 def passage(begin, end, spacing_m, rng):
-    """People side by side, so many that someone is in the view all the time."""
+    """People side by side, as many as needed to have someone in the view all the time."""
     reach = SPEED_MPS * (end - begin) / 2 + FURTHEST_M
     count = max(1, round(2 * reach / spacing_m))
     people = [Person(rng.uniform(NEAREST_M, FURTHEST_M), -reach + spacing_m * (i + rng.uniform(0.3, 0.7)),
                      [[rng.randrange(20, 236) for _ in range(COLUMNS)] for _ in range(ROWS)]) for i in range(count)]
-    return Passage(begin, end, sorted(people, key=lambda person: -person.ahead_m))  # the nearest last
+    return Passage(begin, end, sorted(people, key=lambda person: -person.ahead_m))  # the nearest last, as painted
 
 
 class Camera:
@@ -56,14 +56,14 @@ class Camera:
     def project(self, p):
         x, y = p[0] / p[2], p[1] / p[2]
         (fx, fy, cx, cy), (k1, k2, p1, p2) = self.intrinsics, self.distortion
-        r2 = min(x * x + y * y, 1.5)  # beyond it, far outside the image, the polynomial turns back
+        r2 = min(x * x + y * y, 1.5)  # beyond this, far outside the image, the polynomial is not monotonic
         radial = 1 + r2 * (k1 + r2 * k2)
         return (fx * (x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)) + cx,
                 fy * (y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y) + cy)
 
 
 def board(camera, T_world_cam, foot, right):
-    """The rectangle of the image that a person covers, or None."""
+    """The rectangle of the image that a person covers, or None if the person is not in the image."""
     corners = []
     for side in (-0.5, 0.5):
         for up in (0.0, HEIGHT_M):
@@ -90,7 +90,7 @@ def paint(pixels, camera, rectangle, clothes):
 
 
 class View:
-    """What the recording's camera sees, by its ground truth."""
+    """The view of the recording's camera, by its ground truth."""
 
     def __init__(self, recording):
         self.camera = Camera(recording.camera_yaml)
@@ -103,7 +103,7 @@ class View:
         return trajectory.at(self.poses, self.stamps, self.first_s + second)
 
     def rectangles(self, one, second):
-        """Where the people of a passage are in the image, with their clothes."""
+        """The rectangles in which people of a passage appear in the image, with their clothes."""
         q, p = self.pose(one.middle())
         ahead = rot.rotate(q, (0.0, 0.0, 1.0))
         ahead = rot.scaled(1 / math.hypot(*ahead[:2]), (*ahead[:2], 0.0))
@@ -134,16 +134,16 @@ def walk_past(recording, passages):
 
 
 def passages(spacing_m):
-    """Past a camera that stands, and past one that walks, in the recording "stands"."""
+    """People pass a stationary camera, and later a walking one, in the recording "stands"."""
     rng = random.Random("people")
     return [passage(10.5, 14.5, spacing_m, rng), passage(20, 24, spacing_m, rng)]
 
 
 def people(recording):
-    """Now and then somebody walks past."""
+    """From time to time someone walks past."""
     walk_past(recording, passages(2.2))
 
 
 def crowd(recording):
-    """Shoulder to shoulder: they fill the view."""
+    """People shoulder to shoulder fill the view."""
     walk_past(recording, passages(0.6))

@@ -1,4 +1,4 @@
-"""Grey 8-bit PNG, as the simulator writes them, read and written without further packages."""
+"""Reads and writes grey 8-bit PNG files, like those of the simulator, without further packages."""
 
 import struct
 import zlib
@@ -16,13 +16,13 @@ def chunks(data):
 
 
 def paeth(a, b, c):
-    """Of left, above and above left the one nearest to a + b - c (PNG specification, 9.4)."""
+    """The nearest to a + b - c of left, above and above left (PNG specification, 9.4)."""
     left, above, both = abs(b - c), abs(a - c), abs(a + b - 2 * c)
     return a if left <= above and left <= both else b if above <= both else c
 
 
 def unfiltered(kind, row, above):
-    """A row's pixels of what is stored (PNG specification, 9.2)."""
+    """A row's pixels from the stored bytes (PNG specification, 9.2)."""
     if kind == 0:
         return row
     if kind == 1:

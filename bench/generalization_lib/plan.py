@@ -1,4 +1,4 @@
-"""Which recordings, and which pairs of them; rendered, spoiled, run through VIO, fused in pairs."""
+"""The recordings and the pairs of them; they are rendered, spoiled, run through VIO, and fused in pairs."""
 
 import sys
 from dataclasses import dataclass
@@ -18,11 +18,11 @@ class World:
     name: str
     title: str
     scene: tuple = ()  # hall or room, and its seed
-    path: tuple = ()  # generate walk/flight and a seed; or follow one of paths.WAYS; or an EuRoC path from a second on
+    path: tuple = ()  # pangea-sim's generated walk or flight and seed; a path of paths.WAYS; or an EuRoC path from a given second
     seconds: float = 30
-    options: tuple = ()  # further ones of pangea-sim
-    spoiled: tuple = ()  # by these of spoil.SPOILERS
-    source: str = ""  # the recording that is spoiled, if it is another's
+    options: tuple = ()  # further options of pangea-sim
+    spoiled: tuple = ()  # the faults, from spoil.SPOILERS
+    source: str = ""  # the recording to which faults are added, if it is another's
 
 
 HALL, ROOM, FLIGHTS = ("hall", 101), ("room", 102), ("hall", 103)
@@ -121,7 +121,7 @@ class Plan(accuracy.Plan):
 
 
 class Spoiling(Job):
-    """Its images are those of the rendering it is made of, so who uses it uses that."""
+    """A recording with faults uses the images of its rendering, so its users count as users of the rendering."""
 
     @classmethod
     def added(cls, plan, name, render, spoilers):

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes a recording out of another one, with what goes wrong between a sensor and a folder. Images that stay are links to the other's."""
+"""Makes a recording from another one, with faults that occur between a sensor and a folder. Unchanged images are links to the other's."""
 
 import argparse
 import math
@@ -14,13 +14,13 @@ from generalization_lib import pictures  # noqa: E402
 from generalization_lib.people import crowd, people  # noqa: E402
 
 NS = 1_000_000_000
-# A phone's IMU: white noise and walks several times EuRoC's, 100 Hz (densities of the order of the BMI160's).
+# A phone's IMU: white noise and random walks several times EuRoC's, at 100 Hz (densities of the order of the BMI160's).
 PHONE = {"gyroscope_noise_density": 5e-4, "gyroscope_random_walk": 5e-5, "accelerometer_noise_density": 1e-2,
          "accelerometer_random_walk": 3e-3}
 
 
 class Recording:
-    """Rows of the two tables, as text, the two sensor.yaml, and images to be painted over: file -> what its pixels become."""
+    """Rows of the two tables as text, the two sensor.yaml, and the images to paint over: file -> a function of its pixels."""
 
     def __init__(self, mav0):
         self.mav0 = mav0
@@ -45,7 +45,7 @@ class Recording:
 
 
     def write_images(self, source, folder):
-        """Those that are painted over, and links to the others."""
+        """Writes the images that are painted over, and links to the others."""
         if not self.painted:
             folder.symlink_to(source.resolve())
             return
@@ -86,7 +86,7 @@ def imu_gaps(recording):
 
 
 def disorder(recording):
-    """Rows twice, and rows swapped with their neighbours."""
+    """Doubled rows, and rows swapped with their neighbours."""
     for rows in (recording.images, recording.imu):
         for i in range(50, len(rows) - 1, 97):
             rows[i], rows[i + 1] = rows[i + 1], rows[i]
@@ -128,7 +128,7 @@ def phone_imu(recording):
 
 
 def jitter(recording):
-    """Stamps of images off by 2 ms (standard deviation), as where software stamps them."""
+    """Stamps of images with errors of 2 ms (standard deviation), as of stamps by software."""
     rng = random.Random("jitter")
     for row in recording.images:
         row[0] = str(int(row[0]) + int(rng.gauss(0, 2_000_000)))
@@ -141,7 +141,7 @@ def accel_bias(recording):
 
 
 def cover(recording, *spans):
-    """Nothing but noise from one second to another one."""
+    """Dark images of noise from one second to another one."""
     rng = random.Random("cover")
     noise = bytes(max(0, min(255, round(6 + rng.gauss(0, 2)))) for _ in range(256))
     for row in recording.images:
@@ -164,12 +164,12 @@ def noise_10_times(recording):
 
 
 def noise_a_tenth(recording):
-    """... and ten times too small."""
+    """Noise densities and random walks given ten times too small."""
     scaled_noise(recording, 0.1)
 
 
 def third_of_imu(recording):
-    """Every third sample: of 200 Hz as many as a browser gives."""
+    """Every third sample: with 200 Hz this is about a browser's rate."""
     recording.imu = recording.imu[::3]
 
 
@@ -206,7 +206,7 @@ def hand(recording):
 
 
 def pocket(recording):
-    """Nothing to be seen for 8 s."""
+    """Dark images of noise for 8 s."""
     cover(recording, (15, 23))
 
 
@@ -234,7 +234,7 @@ def browser_motion(recording):
 
 
 def browser_stamps(recording):
-    """Stamps of images off by 8 ms (standard deviation), as where a browser stamps them."""
+    """Stamps of images with errors of 8 ms (standard deviation), as of stamps by a browser."""
     rng = random.Random("browser stamps")
     for row in recording.images:
         row[0] = str(int(row[0]) + int(rng.gauss(0, 8_000_000)))

@@ -1,4 +1,4 @@
-"""What came out: a row for each world and for each pair."""
+"""The results: a row for each world and for each pair."""
 
 import math
 
@@ -34,7 +34,7 @@ class Tables:
                 f"{rmse / path:.2%} |")
 
     def _path_m(self, world):
-        """Of the ground truth, metres."""
+        """Length of the ground-truth path, metres."""
         recording = self.plan.agents[self.plan.WHERE, world.name].recording
         rows = (recording / "mav0/state_groundtruth_estimate0/data.csv").read_text().splitlines()
         points = [[float(x) for x in row.split(",")[1:4]] for row in rows if row and row[0] != "#"][::10]

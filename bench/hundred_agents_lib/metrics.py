@@ -1,11 +1,11 @@
-"""What a run came to: from the journals, and from what was logged on the agents' and the servers' buses."""
+"""The results of a run: from the journals, and from logs of the agents' and the servers' buses."""
 
 from link_lib.metrics import events, keyframes
 from many_agents_lib.metrics import row, spread
 
 
 def closed_loops(log, decode, group_of):
-    """The keyframes with an accepted constraint to one of their group, and how many constraints are accepted."""
+    """The keyframes with an accepted constraint to one of their group, and the number of accepted constraints."""
     ids, accepted = set(), 0
     for _, channel, data in events(log):
         if channel == "CONSTRAINT":
@@ -18,8 +18,8 @@ def closed_loops(log, decode, group_of):
 
 
 def corrected_s(log, keyframes_sent, decode):
-    """Seconds from each of these keyframes on an agent's bus to the first correction that knows it, of those that were sent
-    before the agent's first correction and of the others; and how many have none."""
+    """Seconds from each of these keyframes on an agent's bus to the first correction that includes it: for keyframes sent before
+    the agent's first correction, and for the others; and the number of keyframes without a correction."""
     waiting, first, others, first_utime = dict(keyframes_sent), [], [], None
     for utime, channel, data in events(log):
         if channel.startswith("CORRECTION_"):
@@ -32,7 +32,7 @@ def corrected_s(log, keyframes_sent, decode):
 
 
 def groups(log, decode):
-    """The agents of each group, by what was said last of each."""
+    """The agents of each group, by the last state of each agent's map."""
     group_of = {}
     for _, channel, data in events(log):
         if channel == "MAP_STATE":

@@ -1,4 +1,4 @@
-"""Real processes: of each agent a player and an uplink, of each site a server and a worker, three NATS servers for all."""
+"""Real processes: for each agent a player and an uplink, for each site a server and a worker, and three NATS servers for all."""
 
 import os
 import shutil
@@ -45,7 +45,7 @@ class Run:
         self.options = options
         self.work = options.work.resolve()
         self.bin = options.build.resolve() / "bin"
-        self.memory_kb = {}  # process name: of each that runs, resident
+        self.memory_kb = {}  # process name: resident memory of each running process
         self.took_s = 0
         cluster.BIN = self.bin
 
@@ -53,7 +53,7 @@ class Run:
         subprocess.run([str(word) for word in (self.bin / name, *words)], check=True, stdout=subprocess.DEVNULL)
 
     def record_walks(self):
-        """A keyframe log of each agent of a site; they are kept between runs."""
+        """Records a keyframe log for each agent of a site; the logs are kept between runs."""
         self.walks = []
         for walk in range(1, self.options.agents + 1):
             log = self.work / f"walks/{walk}.lcm"
@@ -99,13 +99,13 @@ class Run:
                         "--keyframes", self.work / f"logs/walk_{agent}.lcm", "--rate", self.options.rate)
 
     def sample_memory(self):
-        """The largest that each process has had, by the program's name."""
+        """The largest memory of each process so far, by the program's name."""
         for entry in Path("/proc").iterdir():
             if entry.name.isdigit():
                 try:
                     program = Path(os.readlink(entry / "exe"))
                     kb = resident_kb(int(entry.name))
-                except OSError:  # it has ended
+                except OSError:  # the process has ended
                     continue
                 if program.parent == self.bin or program.name == "nats-server":
                     of_program = self.memory_kb.setdefault(program.name, {})
@@ -115,7 +115,7 @@ class Run:
         return sum((self.work / f"logs/{site.name}.lcm").stat().st_size for site in self.sites)
 
     def wait(self, processes):
-        """Until all is played and no map has changed for a while."""
+        """Waits until all is played and no map has changed for a while."""
         begin = quiet_since = time.monotonic()
         size = -1
         while time.monotonic() - quiet_since < self.options.quiet:
@@ -147,7 +147,7 @@ class Run:
             processes.stop()
 
     def expected_groups(self):
-        """Of the agents of one site: what one server makes of its journal."""
+        """The groups of one site's agents, according to one server on the site's journal."""
         out = self.work / "replay"
         self.program("pangea-session", "replay", self.sites[0].folder / "journal.lcm", "--out", out)
         return cluster.groups(out)

@@ -1,4 +1,4 @@
-"""Hosts of their own on one machine: network namespaces on a bridge, and nftables that loses packets between them.
+"""Hosts of their own on one machine: network namespaces on a bridge, and nftables that drops packets between them.
 
                      net: a bridge; loses what comes in from a host's port
           ┌────────────┬──┴─────────┐
@@ -15,9 +15,9 @@ import signal
 import subprocess
 import time
 
-OWN_BUS = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304"  # of an agent, of the server: not seen outside
+OWN_BUS = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304"  # of an agent or of the server: not visible from outside
 LINK = "udpm://239.255.76.68:7668?ttl=1&recv_buf_size=4194304"
-HELD = ("setpriv", "--pdeathsig", "KILL", "--")  # ends with the bench
+HELD = ("setpriv", "--pdeathsig", "KILL", "--")  # the process ends with the bench
 RANDOM_RANGE = 1000
 
 
@@ -68,20 +68,20 @@ class Host:
         return process
 
     def lose(self, device, share):
-        """Of what comes in at the device; each frame by itself, at random (nftables takes no seed)."""
+        """Drops this share of the frames that come in at the device, each at random (nftables takes no seed)."""
         self.lost = self.lost_packets()
         self.rules[device] = share
         chains = "".join(chain(device, share) for device, share in self.rules.items() if share > 0)
         self.call("nft", "-f", "-", text=f"table netdev link\ndelete table netdev link\ntable netdev link {{\n{chains}}}\n")
 
     def lost_packets(self):
-        """By all rules so far; fragments count by themselves."""
+        """Packets dropped by all rules so far; each fragment counts."""
         rules = json.loads(self.call("nft", "-j", "list", "ruleset"))["nftables"]
         parts = [part for entry in rules for part in entry.get("rule", {}).get("expr", [])]
         return self.lost + sum(part["counter"]["packets"] for part in parts if "counter" in part)
 
     def bytes_sent(self):
-        """Through eth0, IP headers included, Ethernet's not."""
+        """Bytes sent through eth0, with IP headers, without Ethernet's."""
         statistics = self.call("ip", "-j", "-s", "link", "show", "eth0")
         sent = json.loads(statistics)[0]["stats64"]["tx"]
         return sent["bytes"] - 14 * sent["packets"]
@@ -104,7 +104,7 @@ class Host:
 
 
 class Hosts:
-    """The net, and hosts on it by name; use as a context."""
+    """The network, and the hosts on it by name; use it as a context."""
 
     def __init__(self, names):
         self.hosts, self.names, self.addresses = {}, names, {}
@@ -144,13 +144,13 @@ class Hosts:
         host.call("ip", "route", "add", "224.0.0.0/4", "dev", "eth0")
 
     def lose(self, name, share):
-        """Between the host and the net, both ways."""
+        """Drops this share of the frames between the host and the network, in both directions."""
         self.net.lose(name, share)
         self[name].lose("eth0", share)
 
 
 def check():
-    """Raises NotPermitted with the reason when this machine cannot do it."""
+    """Raises NotPermitted with the reason if this machine cannot make such hosts."""
     missing = [program for program in ("unshare", "nsenter", "setpriv", "ip", "nft") if not shutil.which(program)]
     if missing:
         raise NotPermitted(f"no {', '.join(missing)} on this machine (scripts/setup installs them)")

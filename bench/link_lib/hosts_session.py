@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """One row of bench/link --hosts: a session whose server and agents are hosts of their own (hosts.py).
 
-    hosts_session.py ROW.json OUT      leaves in OUT what pangea-session run does
+    hosts_session.py ROW.json OUT      writes into OUT the same files as pangea-session run
 """
 
 import json
@@ -20,11 +20,11 @@ SERVER = ("place-recognition", "inter-map-ba", "fusion", "posegraph", "global-ba
 WORK = ("KEYFRAME_", "PLACE_MATCH", "AGAIN_", "CONSTRAINT", "MAP_STATE")
 OWN_LINK = OWN_BUS.replace(":7667", ":7669")  # between an uplink and its link emulator
 START_TIMEOUT_S, DRAIN_TIMEOUT_S, QUIET_S, FRESH_S, STEP_S = 30, 300, 2.5, 3, 0.2
-STRANGER_S = 60  # how long it talks
+STRANGER_S = 60  # duration of its messages
 
 
 class Watch:
-    """What the growing logs of a session say: who has work left, and since when nothing has happened."""
+    """Reads the growing logs of a session: which processes have work left, and since when nothing has happened."""
 
     def __init__(self):
         self.read, self.statuses, self.last_work_us = {}, {}, 1e6 * time.time()
@@ -66,7 +66,7 @@ class Session:
         self.watch.read[self.out / f"{log}.lcm"] = 0
 
     def start_server(self):
-        if self.row["strangers"]:  # as on a machine without a route of its own for the bus: others' multicast reaches it
+        if self.row["strangers"]:  # like a machine without its own multicast route for the bus, which other hosts' multicast reaches
             self.hosts["server"].call("ip", "route", "replace", "239.255.76.67/32", "dev", "eth0")
         for agent in self.row["agents"]:
             subprocess.run([self.program("agent-handler"), "keygen", "--agent", str(agent["id"]), "--out",
@@ -97,7 +97,7 @@ class Session:
                           "--keyframes", agent["keyframes"], *duration)
 
     def start_stranger(self):
-        """As long as the agents play; its messages to the server's own bus are for nobody."""
+        """The stranger runs while the agents play; no process may accept its messages to the server's own bus."""
         addresses, rate = self.hosts.addresses, self.row["strangers"] / (self.row["seconds"] or STRANGER_S)
         self.hosts["stranger"].start([sys.executable, Path(__file__).parent / "stranger.py", addresses["stranger"],
                                       addresses["server"], self.row["strangers"], rate], self.out / "logs" / "stranger.txt")

@@ -1,4 +1,4 @@
-"""What a row's session came to: from its report and its captured logs."""
+"""The results of a row's session: from its report and its captured logs."""
 
 import json
 import statistics
@@ -8,11 +8,11 @@ from link_lib.plan import ROWS, is_budget, label
 
 LCM_SYNC = 0xEDA1DA01
 MAX_ATE_CHANGE_M = 0.005
-LOWER_HEADERS = 28 + 8 + len("LINK_UP_1") + 1  # UDP, IP, LCM: what LCM was not given to send
+LOWER_HEADERS = 28 + 8 + len("LINK_UP_1") + 1  # UDP, IP, LCM: bytes that are not in the data given to LCM
 
 
 def events(log, begin=0):
-    """Of an LCM log from byte `begin` on: wall clock in microseconds, channel, data. Ends at the first event that is not whole."""
+    """Events of an LCM log from byte `begin` on: wall clock in microseconds, channel, data. Ends at the first incomplete event."""
     with open(log, "rb") as file:
         file.seek(begin)
         while len(header := file.read(28)) == 28:
@@ -24,18 +24,18 @@ def events(log, begin=0):
 
 
 def keyframes(log):
-    """(agent, map, seq): (when it was logged, its own time, encoded bytes), of the first time each was said."""
+    """(agent, map, seq): (time in the log, its own time, encoded bytes), for the first message of each keyframe."""
     found = {}
     for utime, channel, data in events(log):
         if channel.startswith("KEYFRAME_"):
-            agent, opened, seq, own = struct.unpack_from(">8xiqiq", data)  # behind the type's fingerprint
+            agent, opened, seq, own = struct.unpack_from(">8xiqiq", data)  # after the type's fingerprint
             found.setdefault((agent, opened, seq), (utime, own, len(data)))
     return found
 
 
 def decode_status(data):
-    """An encoded status_t: its line for people, pending, memory_mb, cpu_s, and the counts of what was refused and done."""
-    at = 8  # behind the type's fingerprint
+    """An encoded status_t: its summary, pending, memory_mb, cpu_s, and the counts of refused and processed items."""
+    at = 8  # after the type's fingerprint
 
     def take(form):
         nonlocal at
@@ -58,7 +58,7 @@ def decode_status(data):
 
 
 def statuses(log, process):
-    """Every STATUS_<process>: (wall clock, what it says)."""
+    """Every STATUS_<process>: (wall clock, decoded status)."""
     return [(utime, decode_status(data)) for utime, channel, data in events(log) if channel == f"STATUS_{process}"]
 
 
@@ -73,7 +73,7 @@ def rungs(statuses):
 
 
 def strangers(log):
-    """Of stranger.py's messages on the server's bus: those that a logger heard, which takes everything, and our processes took."""
+    """Counts of stranger.py's messages on the server's bus: those received by a logger, which accepts all, and those that our processes accepted."""
     heard = sum(channel == "RESEND_REQUEST" and not any(data) for _, channel, data in events(log))
     last = {channel: decode_status(data) for _, channel, data in events(log) if channel.startswith("STATUS_")}
     taken = sum(said["refused"].get("resend_request_t does not decode", 0) for said in last.values())
@@ -81,7 +81,7 @@ def strangers(log):
 
 
 def to_play(agent, seconds):
-    """What the player of an agent's stored keyframes plays."""
+    """The keyframes that the player of an agent plays."""
     stored = keyframes(agent.keyframes)
     first = min(own for _, own, _ in stored.values())
     return {id: size for id, (_, own, size) in stored.items() if not seconds or own - first <= 1e6 * seconds}
@@ -123,7 +123,7 @@ class Row:
 
     @staticmethod
     def traffic(options, session, uplinks, lasts):
-        """Bytes on the wire, all headers counted, over the compressed keyframes; and what the handler made of strangers."""
+        """Bytes on the wire, with all headers, relative to the compressed keyframes; and the handler's counts of strangers."""
         handler = newest(statuses(session / "session.lcm", "agent_handler"))
         up = [uplink["counters"] for uplink in uplinks]
 
@@ -163,13 +163,13 @@ class Row:
         perfect = next(row for row in rows if row.name == "perfect")
         change = self.ate_change(rows)
         same = self.metrics["groups"] == perfect.metrics["groups"]
-        if is_budget(ROWS.get(self.name, "")):  # what it costs is shown, and has no bound
+        if is_budget(ROWS.get(self.name, "")):  # the cost of a budget is shown, but not limited
             return whole and same
-        if self.name == "forged":  # each packet that opened is one that an uplink sent
+        if self.name == "forged":  # no packet may be accepted but those that an uplink sent
             same = same and self.metrics["packets_opened"] <= self.metrics["packets_up"]
         if self.name == "strangers":
             same = same and self.metrics["strangers_heard_by_logger"] > 0 and self.metrics["strangers_taken"] == 0
-        if perfect.metrics["ate_joint_m"] is None:  # no ground truth
+        if perfect.metrics["ate_joint_m"] is None:  # without ground truth
             return whole and same
         return whole and same and change is not None and abs(change) <= MAX_ATE_CHANGE_M
 
@@ -182,7 +182,7 @@ HOST_HEAD = ("their network's MB up over the keyframes", "frames lost up, down")
 
 
 def frames(metrics):
-    """What the hosts' network counted itself: all that went up (with hellos), IP headers included."""
+    """Counts of the hosts' network itself: all bytes sent up (with hellos), with IP headers."""
     if "frame_bytes_up" not in metrics:
         return []
     over = metrics["frame_bytes_up"] / (metrics["bytes_compressed"] or 1)

@@ -1,4 +1,4 @@
-"""Which sessions are run: one for each row of the table, the same but for the link."""
+"""The sessions that are run: one for each row of the table; they differ only in the link."""
 
 import json
 import sys
@@ -7,7 +7,7 @@ from pathlib import Path
 
 from accuracy_lib.jobs import OUT, Command, Job
 
-# One factor at a time; both directions of every agent's link, or every agent's budget. The first one is what the others are compared with.
+# One factor at a time, for both directions of every agent's link, or for every agent's budget. The others are compared with the first one.
 ROWS = {
     "perfect": "",
     "loss_1": "loss: 0.01",
@@ -26,7 +26,7 @@ ROWS = {
     "budget_10": "uplink: {budget_kb_per_s: 10}",
     "forged": "",
 }
-# The same with hosts of their own (hosts.py): nftables loses frames and cuts, an emulator on the agent's host does the rest.
+# The same with hosts of their own (hosts.py): nftables drops frames and cuts links, an emulator on the agent's host does the rest.
 HOST_ROWS = {
     "perfect": {},
     "loss_1": {"loss": 0.01},
@@ -74,12 +74,12 @@ def session_yaml(options, conditions):
 
 
 def bus(port):
-    """As pangea-session makes them: the server's, its link, the agents', the agents' links, from --port upwards."""
+    """URLs as pangea-session makes them: the server's, its link, the agents', the agents' links, from --port upwards."""
     return f"udpm://239.255.76.67:{port}?ttl=0&recv_buf_size=4194304"
 
 
 def forger(options, run):
-    """Floods the server's link bus while `run` runs; what it repeats and changes it overhears on the agents' ends."""
+    """Floods the server's link bus while `run` runs; it overhears the packets that it repeats and changes on the agents' ends."""
     agents = len(options.agents)
     seconds = options.seconds or 100
     overheard = [word for k in range(agents) for word in ("--overhear", bus(options.port + 2 + agents + k))]
@@ -113,7 +113,7 @@ def jobs_of(options, work):
 
 
 def label(options, name):
-    """Of a row, for people."""
+    """The label of a row, for people."""
     if not options.hosts:
         return ROWS[name] or name
     return ", ".join(f"{key}: {value}" if key != "emulator" else value for key, value in HOST_ROWS[name].items()) or name

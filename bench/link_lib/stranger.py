@@ -1,6 +1,6 @@
-"""A host that talks to the server's own bus, though it is none of its business: stranger.py ADDRESS SERVER COUNT RATE
+"""A host that sends messages to the server's own bus without permission: stranger.py ADDRESS SERVER COUNT RATE
 
-Half of the datagrams go straight to the server's port, half to the bus' multicast group through the stranger's cable.
+Half of the datagrams go directly to the server's port, half to the bus' multicast group through the stranger's network device.
 """
 
 import socket
@@ -9,7 +9,7 @@ import sys
 import time
 
 GROUP, PORT = "239.255.76.67", 7667
-CHANNEL = b"RESEND_REQUEST"  # what most server processes listen to
+CHANNEL = b"RESEND_REQUEST"  # most server processes subscribe to it
 BATCH_S = 0.01
 
 

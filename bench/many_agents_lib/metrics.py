@@ -1,4 +1,4 @@
-"""What a run came to: from the captured buses and the memory that was sampled."""
+"""The results of a run: from the captured buses and the sampled memory."""
 
 import statistics
 
@@ -6,7 +6,7 @@ from link_lib.metrics import keyframes
 
 
 def spread(values):
-    """Median, 99th percentile and largest, in milliseconds."""
+    """Median, 99th percentile and largest value, in milliseconds."""
     values = sorted(values)
     if not values:
         return None

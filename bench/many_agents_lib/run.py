@@ -1,4 +1,4 @@
-"""Real processes: one agent_handler, and of each agent a player, an uplink and a logger of its bus."""
+"""Real processes: one agent_handler, and for each agent a player, an uplink and a logger of its bus."""
 
 import shutil
 import signal
@@ -8,13 +8,13 @@ import time
 
 from link_lib.metrics import LCM_SYNC, events
 
-AGENT_ID_AT = 8  # in a keyframe's bytes, behind the type's fingerprint
+AGENT_ID_AT = 8  # in a keyframe's bytes, after the type's fingerprint
 STEP_S = 0.2
-MAX_WAIT_S = 60  # at the end, for what was held up
+MAX_WAIT_S = 60  # at the end, for delayed keyframes
 
 
 def copy_for(agent, log, out):
-    """The log's keyframes as another agent's."""
+    """Copies the log's keyframes as those of another agent."""
     with open(out, "wb") as file:
         for number, (utime, channel, data) in enumerate(events(log)):
             if channel.startswith("KEYFRAME_"):
@@ -36,7 +36,7 @@ class Run:
         self.killed = options.agents if options.trouble_at else None
         self.ids = range(1, options.agents + 1)
         self.memory = []  # (wall clock s, agents running, resident kB of the handler, of each uplink)
-        self.trouble = None  # wall clock, microseconds: from when, until when
+        self.trouble = None  # wall clock, microseconds: begin and end
         self.processes = {}
 
     def url(self, number):
@@ -85,7 +85,7 @@ class Run:
             self.processes[name].send_signal(number)
 
     def make_trouble(self, since_joined):
-        """Stops and kills once, and wakes what was stopped."""
+        """Stops and kills once, and continues the stopped uplink."""
         now = int(1e6 * time.time())
         if self.trouble is None and since_joined >= self.options.trouble_at:
             self.trouble = [now, None]
@@ -113,7 +113,7 @@ class Run:
                     self.make_trouble(time.time() - joined)
                 self.sample_memory()
                 time.sleep(STEP_S)
-            time.sleep(1.5)  # the last status
+            time.sleep(1.5)  # for the last status
         finally:
             for process in self.processes.values():
                 if process.poll() is None:

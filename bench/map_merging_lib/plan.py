@@ -1,4 +1,4 @@
-"""Which jobs the table takes: render each recording, VIO on it, the server on it alone and on each session in both orders."""
+"""The jobs for the table: render each recording, run VIO on it, run the server on it alone and on each session in both orders."""
 
 from accuracy_lib import plan as accuracy
 from accuracy_lib.jobs import OUT, Command
@@ -42,7 +42,7 @@ class Plan(accuracy.Plan):
         argv += ["--duration", f"{world.seconds:g}", "--camera", world.lens, "--image-rate", str(world.rate), *world.options]
         argv += ["--out", OUT, "--seed", str(seed), "--threads", "1", "--no-cache"]
         job = accuracy.RenderJob("render", world.name, self.work / "rendered" / world.name, [Command(argv)])
-        # A second more, of which the simulator takes what its exposure needs.
+        # A second more, from which the simulator takes the margin that its exposure needs.
         job.files = {f"{other.name}.tum": ways.tum(other.way, other.seconds + 1, other.lens) for other in together}
         self.jobs.append(job)
         return job

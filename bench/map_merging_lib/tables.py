@@ -1,4 +1,4 @@
-"""What came out: a row for each session, and what it misses of what it is held to."""
+"""The results: a row for each session, and the bounds that it misses."""
 
 from dataclasses import dataclass, field
 
@@ -6,7 +6,7 @@ from accuracy_lib.metrics import Measured
 from map_merging_lib.worlds import MUST, NEVER
 
 WORSE_M, ORDER_M = 0.005, 0.005
-NEES, FEW_CONSTRAINTS = (0.5, 2.0), 10  # the mean of fewer says nothing
+NEES, FEW_CONSTRAINTS = (0.5, 2.0), 10  # a mean of fewer is not significant
 
 
 def metres(value):
@@ -16,14 +16,14 @@ def metres(value):
 @dataclass
 class Row:
     session: object
-    alone: list = field(default_factory=list)  # metres, each with the server alone
+    alone: list = field(default_factory=list)  # metres, for each recording with the server alone
     fused: list = field(default_factory=list)  # the same in the session
-    joint: list = field(default_factory=list)  # the joint map's, in either order
+    joint: list = field(default_factory=list)  # of the joint map, for both orders
     apart: bool = True
-    constraints: int = 0  # accepted between them
-    wrong: int = 0  # of these and of loops
-    nees: float | None = None  # a dimension
-    vio: list = field(default_factory=list)  # what is wrong with the odometry alone
+    constraints: int = 0  # accepted between the recordings
+    wrong: int = 0  # of these and of the loops within maps
+    nees: float | None = None  # per dimension
+    vio: list = field(default_factory=list)  # faults of the odometry alone
 
     def missed(self):
         out = list(self.vio)
@@ -101,7 +101,7 @@ class Tables:
 
 
 def _constraints(truth):
-    """Checked, wrong, and the mean NEES a dimension."""
+    """Numbers of checked and of wrong constraints, and the mean NEES per dimension."""
     if not truth or not truth["checked"]:
         return 0, 0, None
     return truth["checked"], truth["wrong"], truth["nees_per_dim"]["mean"]

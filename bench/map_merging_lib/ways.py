@@ -1,6 +1,6 @@
-"""Ways of people and drones through halls, along corners that are rounded off, as TUM poses of the body.
+"""Paths of people and drones through halls, along rounded corners, as TUM poses of the body.
 
-A way hangs on the time alone, so it can be cut anywhere; all are in motion from the first frame on.
+A path depends only on time, so it can be cut anywhere; all move from the first frame on.
 """
 
 import math
@@ -12,21 +12,21 @@ from generalization_lib.paths import EUROC, RATE_HZ, body_pose, quaternion
 PHONE = (((0, 1, 0), (1, 0, 0), (0, 0, -1)), (0.04, 0.01, -0.005))
 EXTRINSICS = {"euroc": EUROC, "phone": PHONE, "wide": PHONE}
 ROUNDING_M = 1.6  # to either side of a corner
-SAMPLES = 24  # of the rounding
+SAMPLES = 24  # for the mean over a rounding
 
 
 @dataclass(frozen=True)
 class Way:
-    corners: tuple  # of the ground below, metres; the last one as the first: round and round
-    flies: bool = False  # otherwise somebody walks, a camera in the hand
-    speed: float = 1.2  # m/s, in the mean
-    height: float = 1.5  # m, in the mean
-    looks: float = 0  # to the left of where it goes, degrees
+    corners: tuple  # points on the ground, metres; if the last equals the first, the path goes round and round
+    flies: bool = False  # otherwise a walk with a camera in the hand
+    speed: float = 1.2  # m/s, on average
+    height: float = 1.5  # m, on average
+    looks: float = 0  # degrees, to the left of the direction of motion
     start: float = 0  # metres along the corners
 
 
 def along(corners, s):
-    """The point s metres along the corners; before the first and beyond the last it goes straight on."""
+    """The point s metres along the corners; before the first and beyond the last the path is straight."""
     legs = [math.dist(a, b) for a, b in zip(corners, corners[1:])]
     if corners[0] == corners[-1]:
         s %= sum(legs)
@@ -39,7 +39,7 @@ def along(corners, s):
 
 
 def rounded(corners, s):
-    """The mean of what is near, the nearest weighing most: twice differentiable over a corner."""
+    """Weighted mean of the points nearby, with the largest weight for the nearest: twice differentiable at a corner."""
     steps = [2 * (k + 0.5) / SAMPLES - 1 for k in range(SAMPLES)]
     weights = [1 + math.cos(math.pi * u) for u in steps]
     points = [along(corners, s + ROUNDING_M * u) for u in steps]

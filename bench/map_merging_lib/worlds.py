@@ -1,4 +1,4 @@
-"""The recordings, and who meets whom. A scene is built around all ways that lead through it."""
+"""The recordings, and the sessions that combine them. A scene is built around all paths that lead through it."""
 
 from dataclasses import dataclass
 
@@ -9,21 +9,21 @@ MUST, MAY, NEVER = "yes", "may", "never"
 
 @dataclass(frozen=True)
 class World:
-    """A recording: a way through a scene, and what looks at it."""
+    """A recording: a path through a scene, and a camera."""
 
     name: str
     title: str
-    scene: tuple  # as pangea-sim's --scene and --scene-seed
+    scene: tuple  # like pangea-sim's --scene and --scene-seed
     way: Way
     seconds: float = 32
     lens: str = "euroc"
-    rate: int = 20  # images a second
-    options: tuple = ()  # further ones of pangea-sim
+    rate: int = 20  # images per second
+    options: tuple = ()  # further options of pangea-sim
 
 
 @dataclass(frozen=True)
 class Session:
-    """Recordings that one server hears, and whether they ought to be one map."""
+    """Recordings that one server receives, and whether they should become one map."""
 
     names: tuple
     title: str

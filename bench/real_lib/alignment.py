@@ -1,4 +1,4 @@
-"""Sim(3) alignment of camera centres: estimate = s R reference + t, so s is the estimate's scale where the reference is metric.
+"""Sim(3) alignment of camera centres: estimate = s R reference + t, so s is the estimate's scale if the reference is metric.
 
 Rotation by Horn's quaternions (1987), scale and residuals by Umeyama (1991), in the estimate's own metres.
 """
@@ -10,7 +10,7 @@ from real_lib import rotations as rot
 
 
 def largest_eigenvector(matrix, sweeps=30):
-    """Of a symmetric matrix, by Jacobi's rotations."""
+    """Eigenvector of a symmetric matrix, by Jacobi's rotations."""
     n = len(matrix)
     a = [list(row) for row in matrix]
     v = [[float(i == j) for j in range(n)] for i in range(n)]
@@ -39,7 +39,7 @@ def _eliminate(a, v, p, q):
 
 @dataclass
 class Centred:
-    """One piece: the moments about its means."""
+    """One piece: its moments about the means."""
 
     rotation: tuple  # reference to estimate
     covariance: float  # sum of estimate . R reference
@@ -51,7 +51,7 @@ class Centred:
         return self.covariance / self.spread if self.spread > 0 else math.nan
 
     def squared(self, scale):
-        """Residuals at this scale, each squared."""
+        """The squared residuals at this scale."""
         return [math.dist(e, rot.scaled(scale, rot.rotate(self.rotation, r))) ** 2 for e, r in zip(self.estimate, self.reference)]
 
 
@@ -70,7 +70,7 @@ def centred(estimate, reference):
 
 
 def common_scale(pieces):
-    """Of pieces that share a scale, each with a rotation and translation of its own."""
+    """Common scale of pieces, each with a rotation and translation of its own."""
     spread = sum(piece.spread for piece in pieces)
     return sum(piece.covariance for piece in pieces) / spread if spread > 0 else math.nan
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Structure from motion by COLMAP (package colmap) on every n-th image: camera poses up to scale, as TUM, a piece for each model.
+"""Structure from motion by COLMAP (package colmap) on every n-th image: camera poses up to scale, as TUM, with a piece for each model.
 
-SIFT on the CPU; sequential matching, all pairs where there are few images. Intrinsics begin with those of sensor.yaml.
+SIFT on the CPU; sequential matching, or all pairs if there are few images. The initial intrinsics are those of sensor.yaml.
 """
 
 import argparse
@@ -15,9 +15,9 @@ from accuracy_lib.plan import mav0_of  # noqa: E402
 from real_lib import rotations as rot  # noqa: E402
 from real_lib import trajectory  # noqa: E402
 
-FEATURES = 2000  # an image: matching them on a CPU grows with the square
-FEW = 60  # images: all pairs are matched
-OVERLAP = 12  # images after each that it is matched with
+FEATURES = 2000  # per image: the time to match them on a CPU grows with the square
+FEW = 60  # images: up to this number all pairs are matched
+OVERLAP = 12  # number of following images with which each image is matched
 
 
 def camera(sensor_yaml):
@@ -59,7 +59,7 @@ def reconstruct(mav0, images, work):
 
 
 def read_model(images_txt, stamps):
-    """Poses T_ref_cam; COLMAP writes T_cam_ref, then a line of points, of each image."""
+    """Poses T_ref_cam; for each image COLMAP writes T_cam_ref, then a line of points."""
     poses = []
     rows = [line for line in images_txt.read_text().splitlines() if not line.startswith("#")]
     for row in rows[::2]:

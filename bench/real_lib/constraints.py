@@ -5,7 +5,7 @@ import struct
 from link_lib.metrics import events, keyframes
 from real_lib import rotations as rot
 
-HEAD = ">8xq iqi iqi b? i"  # behind the type's fingerprint; last the length of the reason
+HEAD = ">8xq iqi iqi b? i"  # after the type's fingerprint; the last field is the length of the reason
 
 
 def accepted(log):

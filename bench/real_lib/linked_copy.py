@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes a recording that is another one with other sensor.yaml files, or single values of them; images and samples are links."""
+"""Makes a copy of a recording with other sensor.yaml files, or with other single values in them; images and samples are links."""
 
 import argparse
 import re
@@ -20,7 +20,7 @@ def sensor_of(text):
 
 
 def changed(texts, key, value):
-    """The one sensor.yaml that has the key, with this value."""
+    """The only sensor.yaml that has the key, with this value."""
     having = [name for name, text in texts.items() if re.search(rf"^{key}:", text, re.M)]
     if len(having) != 1:
         raise SystemExit(f"real: --set {key}: {len(having)} sensor.yaml have it, one is needed")

@@ -1,4 +1,4 @@
-"""A trajectory of camera poses against a reference, which may be in pieces; a scale is the estimate's over the reference's."""
+"""Compares a trajectory of camera poses with a reference, which may be in pieces; a scale is the estimate's relative to the reference's."""
 
 import math
 from dataclasses import dataclass
@@ -7,18 +7,18 @@ from real_lib import rotations as rot
 from real_lib import trajectory
 from real_lib.alignment import centred, common_scale, rmse
 
-MIN_POSES = 8  # of a piece, or of a half of it
-SHIFT_S, SHIFT_STEP_S = 0.1, 0.005  # what is tried to either side
+MIN_POSES = 8  # for a piece, or for a half of it
+SHIFT_S, SHIFT_STEP_S = 0.1, 0.005  # range of the search, in both directions, and its step
 REVISIT_APART_S = 10.0
-REVISIT_M, REVISIT_RAD = 1.0, math.radians(45)  # between two camera poses that see the same
-REVISIT_STEP_S = 0.4  # of the poses that are paired
+REVISIT_M, REVISIT_RAD = 1.0, math.radians(45)  # between two camera poses that see the same place
+REVISIT_STEP_S = 0.4  # between the poses that are paired
 WRONG_M, WRONG_RAD = 0.5, math.radians(5)
-ACROSS = 2  # times as much between pieces: where they join, a reference bends
+ACROSS = 2  # factor on the bounds between pieces, because a reference is less accurate where they join
 
 
 @dataclass
 class Matched:
-    """One piece of the reference with the estimate's poses: (stamp, estimate, reference)."""
+    """One piece of the reference, with the estimate's poses: (stamp, estimate, reference)."""
 
     frame: int
     pairs: list
@@ -35,7 +35,7 @@ def matched(estimate, pieces, shift_s=0.0):
 
 
 def best_shift(estimate, pieces):
-    """Of another system, which may stamp in the clock of its IMU: how far it is ahead of the images', by the smallest ATE."""
+    """How far another system's stamps, which may be in its IMU's clock, are ahead of the images': the shift with the smallest ATE."""
     steps = round(SHIFT_S / SHIFT_STEP_S)
 
     def error(step):
@@ -47,7 +47,7 @@ def best_shift(estimate, pieces):
 
 
 def main_frame(fits):
-    """Those of the frame with most poses: only they have a scale in common."""
+    """The fits in the frame with most poses: only these share a scale."""
     frames = [frame for frame, _ in fits]
     most = max(frames, key=lambda frame: sum(len(fit.estimate) for f, fit in fits if f == frame))
     return [fit for frame, fit in fits if frame == most]
@@ -59,7 +59,7 @@ def scale_within(pieces, begin=-math.inf, end=math.inf):
 
 
 def measure(estimate, pieces, shift=0.0):
-    """None when too few poses are known in both."""
+    """Returns None if both have too few poses in common."""
     known = matched(estimate, pieces, shift)
     fits = [(m.frame, fit) for m in known if (fit := m.fit())]
     if not fits:
@@ -80,20 +80,20 @@ def measure(estimate, pieces, shift=0.0):
 
 
 def expected(estimate, piece):
-    """How many pairs there would be, were the whole piece covered."""
+    """The number of pairs if the whole piece were covered."""
     period = max(trajectory.period(piece.poses), trajectory.period(estimate))
     return 1 + math.floor((piece.poses[-1][0] - piece.poses[0][0]) / period) if math.isfinite(period) else len(piece.poses)
 
 
 def near(a, b):
-    """Two camera poses that see the same place."""
+    """Whether two camera poses see the same place."""
     T = rot.between(a, b)
     ahead = rot.rotate(T[0], (0.0, 0.0, 1.0))
     return math.hypot(*T[1]) <= REVISIT_M and math.acos(max(-1.0, min(1.0, ahead[2]))) <= REVISIT_RAD
 
 
 def revisits(known, scale):
-    """Relative poses of places seen again, in the reference's metres: the odometry's drift where a loop may be closed."""
+    """Errors of relative poses of revisited places, in the reference's metres: the odometry's drift where a loop may be closed."""
     metres, radians = [], []
     for pairs in same_frame(known):
         nodes = spaced([(t, e, r) for _, (t, e, r) in pairs])
@@ -123,7 +123,7 @@ def spaced(nodes):
 
 
 def difference(T_estimate, T_reference, scale):
-    """Metres of the reference, radians."""
+    """Distance in metres of the reference, and angle in radians."""
     off = rot.subtract(rot.scaled(1 / scale, T_estimate[1]), T_reference[1]) if scale else T_reference[1]
     return math.hypot(*off), rot.angle(rot.multiply(rot.conjugate(T_estimate[0]), T_reference[0]))
 
@@ -133,9 +133,9 @@ def middle_of(values):
 
 
 def check_constraints(constraints, pieces, scale, T_body_cam):
-    """Accepted ones, (from stamp, to stamp, T_from_to of the bodies), that the reference knows: checked, wrong, of revisits.
+    """Checks the accepted constraints (from stamp, to stamp, T_from_to of the bodies) that the reference covers: checked, wrong, of revisits.
 
-    Both of one piece: off by more than WRONG_M or WRONG_RAD; of two pieces of one frame ACROSS times as much."""
+    Wrong within one piece: an error above WRONG_M or WRONG_RAD; between two pieces of one frame: ACROSS times as much."""
     result = {"checked": 0, "wrong": 0, "revisits": 0, "median_m": None, "median_deg": None}
     metres, radians = [], []
     for t, u, T_from_to in constraints:

@@ -1,4 +1,4 @@
-"""Which jobs the table takes: a reference, VIO from each start, the server on each, and on the recording's two halves."""
+"""The jobs for the table: a reference, VIO from each start, the server on each, and on the recording's two halves."""
 
 import sys
 from dataclasses import dataclass, field
@@ -13,7 +13,7 @@ REFERENCE = "reference.colmap.tum"
 
 @dataclass(eq=False)
 class Made(Job):
-    """A job whose product accuracy_lib's plan takes for a rendered recording; it keeps it, whoever uses it."""
+    """A job whose product replaces a rendered recording in accuracy_lib's plan; the product is always kept."""
 
     users: list = field(default_factory=list)
 
@@ -76,12 +76,12 @@ class Plan(accuracy.Plan):
         return job
 
     def groundtruth(self):
-        """Its file; a --reference goes before it."""
+        """The file of ground truth; a --reference takes precedence over it."""
         file = self.mav0() / "state_groundtruth_estimate0/data.csv"
         return file if file.is_file() and not self.options.reference else None
 
     def reference_file(self):
-        """Of camera poses, given or beside the recording."""
+        """The file of camera poses, given or beside the recording."""
         beside = [self.mav0() / REFERENCE, self.mav0().parent / REFERENCE]
         given = [Path(self.options.reference)] if self.options.reference else beside
         found = next((file for file in given if file.is_file()), None)
@@ -91,7 +91,7 @@ class Plan(accuracy.Plan):
 
 
 def stamps(mav0):
-    """Nanoseconds of the images."""
+    """The images' stamps in nanoseconds."""
     return [int(line.split(",")[0]) for line in (mav0 / "cam0/data.csv").read_text().splitlines() if line and line[0].isdigit()]
 
 

@@ -1,4 +1,4 @@
-"""What the products of a plan come to: measured for each run, and for other systems' trajectories."""
+"""Evaluates the products of a plan: for each run, and for other systems' trajectories."""
 
 from accuracy_lib import plan as accuracy
 from accuracy_lib.metrics import read_json
@@ -48,7 +48,7 @@ class Results:
         result = self._measured(sorted(dense), len(report["groups"]))
         if result:
             result["fused"] = any(len(group["agents"]) == len(agents) for group in report["groups"])
-            # Maps apart have no scale together: then that of a constraint is its first agent's.
+            # Separate maps have no common scale: the scale of a constraint is then that of its first agent.
             alone = None if result["fused"] else self._measured(self._optimised(job.folder, agents[0]), 1)
             result["constraints"] = self._constraints(job.folder, agents, report, (alone or result)["scale"])
         return result
@@ -66,7 +66,7 @@ class Results:
 
     @staticmethod
     def _maps(agent):
-        """The odometry's maps, each as its poses."""
+        """The odometry's maps, each as a list of its poses."""
         files = sorted(agent.vio.folder.glob("vio.tum*")) if agent.vio.ended_well else []
         return [poses for file in files if (poses := trajectory.read(file))]
 

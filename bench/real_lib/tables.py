@@ -28,7 +28,7 @@ def constraints_row(name, c):
 
 
 def spread(rows):
-    """Largest scale over smallest; None of fewer than two."""
+    """The largest scale divided by the smallest; None for fewer than two."""
     scales = [r["scale"] for r in rows if r]
     return max(scales) / min(scales) if len(scales) > 1 and min(scales) > 0 else None
 

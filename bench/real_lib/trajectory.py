@@ -1,7 +1,7 @@
-"""Trajectories as sorted lists of (stamp in seconds, (q, p)), and what is read and written of them.
+"""Trajectories as sorted lists of (stamp in seconds, (q, p)), and the files that contain them.
 
-A reference may be in pieces: structure from motion that did not join. A line '# piece' in the file begins one in a frame and a
-scale of its own; a hole in time ends a piece too, with the frame in common.
+A reference may be in pieces if structure from motion did not join all images. A line '# piece' in the file begins one in a frame and a
+scale of its own; a hole in time ends a piece too, but both pieces share the frame.
 """
 
 import bisect
@@ -14,8 +14,8 @@ from generalization_lib.paths import quaternion
 from real_lib import rotations as rot
 
 PIECE_MARK = "# piece"
-HOLE_S = 5.0  # between two poses of a reference: the next piece
-MAX_GAP_S = 0.6  # that is interpolated over
+HOLE_S = 5.0  # a longer time between two poses of a reference begins the next piece
+MAX_GAP_S = 0.6  # longest gap that is interpolated
 
 
 @dataclass
@@ -49,7 +49,7 @@ def grown(pieces, scale):
 
 
 def read(path):
-    """Of one frame, however many holes it has."""
+    """All poses of the file in one frame, with any number of holes."""
     return sorted(pose for piece in read_pieces(path) for pose in piece.poses)
 
 
@@ -58,7 +58,7 @@ def tum(poses):
 
 
 def read_groundtruth(csv):
-    """EuRoC's, of the rig: nanoseconds, position, quaternion w x y z."""
+    """EuRoC's ground truth of the rig: nanoseconds, position, quaternion w x y z."""
     poses = []
     for line in Path(csv).read_text().splitlines():
         if line and line[0].isdigit():
@@ -76,12 +76,12 @@ def extrinsics(sensor_yaml):
 
 
 def moved(poses, T):
-    """Of what stands at T in the frame that moves: the camera's poses of the body's."""
+    """The poses of an object at T in the moving frame, for instance the camera's poses from the body's."""
     return [(t, rot.compose(pose, T)) for t, pose in poses]
 
 
 def at(poses, stamps, t, max_gap_s=MAX_GAP_S):
-    """The pose at t between its neighbours; None outside, and in a hole."""
+    """The pose at t, interpolated between its neighbours; None outside the trajectory, and in a hole."""
     i = bisect.bisect_left(stamps, t)
     if i < len(stamps) and stamps[i] - t < 1e-6:
         return poses[i][1]
@@ -104,7 +104,7 @@ def period(poses):
 
 
 def pairs(estimate, reference, shift_s=0.0):
-    """(stamp, estimate's pose, reference's pose) at the sparser one's stamps; the estimate's clock is ahead by the shift."""
+    """(stamp, estimate's pose, reference's pose) at the stamps of the sparser one; the estimate's clock is ahead by the shift."""
     if period(reference) > period(estimate):
         stamps = stamps_of(estimate)
         known = ((t, at(estimate, stamps, t + shift_s), pose) for t, pose in reference)
@@ -119,8 +119,8 @@ def path_m(positions):
 
 
 def at_camera_rate(keyframes, odometry, max_gap_s=6.0):
-    """The optimised keyframes with the odometry's motion between them: each pose as both neighbours place it, the nearer
-    weighing more. A keyframe of which the odometry has no pose is left out."""
+    """The optimised keyframes with the odometry's motion between them: each pose is a mean of its positions by both neighbours, of which the nearer
+    has more weight. A keyframe without a pose of the odometry is left out."""
     own = dict(odometry)
     stamps = stamps_of(odometry)
     corrections = []
@@ -138,7 +138,7 @@ def at_camera_rate(keyframes, odometry, max_gap_s=6.0):
 
 
 def _blended(corrections, times, t, pose):
-    """Not the interpolated correction: its rotation acts far from its frame's origin."""
+    """Blends the poses, not the corrections: an interpolated correction's rotation would act far from the origin of its frame."""
     j = min(max(bisect.bisect_left(times, t), 1), len(times) - 1) if len(times) > 1 else 0
     i = max(j - 1, 0)
     a, b = (rot.compose(corrections[k][1], pose) for k in (i, j))

@@ -15,7 +15,7 @@ def url(port):
 
 
 def write_journal(options, site, keyframes):
-    """One of fewer keyframes, in whole visits, is the begin of it."""
+    """Writes a journal. A journal of fewer keyframes, in whole visits, is the beginning of a longer one."""
     subprocess.run([options.build.resolve() / "bin/pangea-restart-journal", options.log, "--out", site / "journal.lcm",
                     "--keyframes", str(keyframes)], check=True)
 
@@ -30,7 +30,7 @@ def make_site(options, name):
 
 
 def watch(bus, status_type, begin, timeout_s, rest_s):
-    """The newest status of each process, for `rest_s` after all are ready, or until the time is out."""
+    """The newest status of each process, until `rest_s` after all are ready, or until the timeout."""
     newest = {}
     bus.subscribe("STATUS_.*", lambda channel, status: newest.__setitem__(status.process, status), status_type)
     ready = None
@@ -69,7 +69,7 @@ def start(options, site):
 
 
 def measure(options, keyframes):
-    """One of {keyframes, start, processes: {name: metrics}} for each start."""
+    """{keyframes, start, processes: {name: metrics}} for each start."""
     site = make_site(options, keyframes)
     write_journal(options, site, keyframes)
     for number in range(1, options.starts + 1 + (options.later > 0)):

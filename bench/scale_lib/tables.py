@@ -1,10 +1,10 @@
-"""Cities of several sizes as a table: one column each, and how much more the larger one takes."""
+"""Cities of several sizes as a table: one column for each, and the ratio of the larger one to the smaller."""
 
 PROCESSES = ("place_recognition", "inter_map_ba", "fusion", "posegraph", "global_ba", "map_points")
 
 
 def ready_s(start):
-    """Seconds until all processes are; None if one never was."""
+    """Seconds until all processes are ready; None if one never was."""
     times = [process["ready_s"] for process in start.values()]
     return None if None in times else max(times)
 
@@ -30,7 +30,7 @@ def number(value):
 
 
 def ratios(values):
-    """Of each to the one before it."""
+    """The ratio of each value to the one before it."""
     pairs = zip(values, values[1:])
     return ", ".join("–" if not a or b is None else f"{b / a:.2f}" for a, b in pairs)
 
@@ -52,7 +52,7 @@ def fused_after(run):
 
 
 def wrong(run):
-    """All constraints that agents' keyframes got: wrong ones, of those that were accepted."""
+    """All constraints of the agents' keyframes: number of wrong ones, of those accepted."""
     return f"{sum(of_agents(run, 'wrong'))} of {sum(of_agents(run, 'accepted'))}"
 
 

@@ -14,7 +14,7 @@ POLL_S = 0.2
 
 
 def call(url, method="GET", body=None, revision=None):
-    """The answer as an object. What is refused is raised with the server's reason."""
+    """Returns the answer as an object. For a refusal it raises an error with the server's reason."""
     request = urllib.request.Request(url, method=method, data=None if body is None else json.dumps(body).encode())
     request.add_header("Content-Type", "application/json")
     if revision is not None:
@@ -24,12 +24,12 @@ def call(url, method="GET", body=None, revision=None):
             return json.loads(answer.read() or "null")
     except urllib.error.HTTPError as error:
         raise RuntimeError(f"{method} {url}: {error.code}: {error.read().decode()}") from None
-    except OSError as error:  # urllib's own errors too
+    except OSError as error:  # this includes urllib's own errors
         raise RuntimeError(f"{method} {url}: {getattr(error, 'reason', error)}: is pangea-server running there, with --http?") from None
 
 
 def group_of(server, agent):
-    """Whose map frame the position is in; of the first agent, if none is given."""
+    """The group in whose map frame the position is given: that of the agent, or of the first one if none is given."""
     agents = [each for each in call(f"{server}/v1/agents")["agents"] if agent in (None, each["id"])]
     if not agents:
         raise RuntimeError("the server has no map of this agent yet")

@@ -3,7 +3,7 @@
 
     euroc_source.py --agent 3 --recording MH_01 [--bus URL] [--rate 1]       beside: pangea-vio --live --agent 3
 
-For sensors of your own replace `Recording`: the loop in `play` is all that a source has to do (docs/bus.md).
+For your own sensors replace `Recording`: the loop in `play` is all that a source has to do (docs/bus.md).
 """
 
 import argparse
@@ -17,7 +17,7 @@ try:
     from pangea import camera_t, imu_t, pose_t
     from pangea.bus import DEFAULT_URL, Bus, image_chunks
 except ModuleNotFoundError:
-    if not {"-h", "--help"} & set(sys.argv):  # which needs none of it
+    if not {"-h", "--help"} & set(sys.argv):  # --help does not need the package
         sys.exit("euroc_source: no package pangea: set PYTHONPATH to build/release/python of Pangea's tree, or install Pangea")
 
 CAMERA_INTERVAL_S = 1.0
@@ -28,7 +28,7 @@ def fail(why):
 
 
 def numbers(text, key, path):
-    """The list that stands at `key`; EuRoC's sensor.yaml without a YAML reader, which Python has not."""
+    """The list of numbers at `key`. EuRoC's sensor.yaml is read without a YAML parser, because Python has none."""
     found = re.search(rf"\b{key}:\s*\[([^\]]*)\]", text)
     if not found:
         fail(f"{path}: field '{key}' (a list of numbers) is missing")
@@ -53,7 +53,7 @@ def relative(a, b):
 
 def set_transform(message, R, t):
     message.translation.x, message.translation.y, message.translation.z = t
-    # Each of the four squares in turn: the largest one gives the others without a small divisor.
+    # One of the four squares in turn: the largest one gives the others without a small divisor.
     squares = [1 + R[0][0] + R[1][1] + R[2][2], 1 + R[0][0] - R[1][1] - R[2][2],
                1 - R[0][0] + R[1][1] - R[2][2], 1 - R[0][0] - R[1][1] + R[2][2]]
     w, x, y, z = [(squares[0], R[2][1] - R[1][2], R[0][2] - R[2][0], R[1][0] - R[0][1]),
@@ -104,7 +104,7 @@ class Recording:
 
     @staticmethod
     def _events(path, parse):
-        """What `parse` makes of each row."""
+        """The result of `parse` for each row."""
         with path.open() as file:
             reader = csv.reader(file)
             for row in reader:
@@ -146,7 +146,7 @@ def play(recording, bus, agent, rate):
     for utime, event in recording.events:
         due_s = begin_s + 1e-6 * (utime - begin_utime) / rate
         while (left_s := due_s - time.monotonic()) > 0:
-            bus.handle(left_s)  # what the odometry says meanwhile
+            bus.handle(left_s)  # messages of the odometry that arrive meanwhile
         if time.monotonic() >= next_camera_s:
             bus.publish(f"CAMERA_{agent}", camera)
             next_camera_s += CAMERA_INTERVAL_S
@@ -158,7 +158,7 @@ def play(recording, bus, agent, rate):
 
 
 def say_states(bus, agent):
-    """One line whenever the odometry's state changes."""
+    """Prints one line whenever the odometry's state changes."""
     states = {pose_t.STATE_INITIALISING: "initialising", pose_t.STATE_TRACKING: "tracking", pose_t.STATE_LOST: "lost"}
     last = [None]
 

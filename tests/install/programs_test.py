@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""`cmake --install` needs nothing that building `programs` does not make: programs_test.py BUILD_DIR"""
+"""Tests that `cmake --install` needs only files that the target `programs` builds: programs_test.py BUILD_DIR"""
 
 import re
 import subprocess
@@ -12,7 +12,7 @@ def ninja(build, *arguments):
 
 
 def installed(build):
-    """Files and folders of the build tree that are installed and must be there."""
+    """Files and folders of the build tree that are installed and must exist."""
     for script in build.rglob("cmake_install.cmake"):
         for command in re.findall(r"file\(INSTALL ([^)]*)\)", script.read_text()):
             if " OPTIONAL" not in command:
@@ -21,7 +21,7 @@ def installed(build):
 
 def main(build):
     outputs = {build / line.split(": ")[0] for line in ninja(build, "-t", "targets", "all") if ": " in line}
-    graph = "\n".join(ninja(build, "-t", "graph", "programs"))  # unlike `-t inputs` with what is built first, order-only
+    graph = "\n".join(ninja(build, "-t", "graph", "programs"))  # unlike `-t inputs`, it includes order-only inputs
     made = {build / label for label in re.findall(r'label="([^"]+)"', graph)}
     wanted = [Path(path) for path in installed(build)]
     assert len(wanted) > 50, f"only {len(wanted)} installed files were found"

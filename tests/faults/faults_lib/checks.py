@@ -1,4 +1,4 @@
-"""What a disturbed session must have in common with the undisturbed one, as rows: claim, value, whether it holds."""
+"""Comparisons of a disturbed session with the undisturbed one, as rows: claim, value, whether it holds."""
 
 import struct
 from collections import Counter
@@ -18,7 +18,7 @@ class Row:
 
 
 def acknowledged(agent_log):
-    """(agent, map): the highest seq that the uplink ever called acknowledged on its agent's bus."""
+    """(agent, map): the highest seq that the uplink ever reported as acknowledged on its agent's bus."""
     highest = {}
     for _, channel, data in events(agent_log):
         if channel == "HAVE":
@@ -31,13 +31,13 @@ def acknowledged(agent_log):
 
 
 def all_acknowledged(session, agents):
-    """(agent, map, seq) of every keyframe that was ever called acknowledged."""
+    """(agent, map, seq) of every keyframe that was ever reported as acknowledged."""
     return {(id, opened, s) for agent in agents
             for (id, opened), seq in acknowledged(session.out / f"agent_{agent.id}.lcm").items() for s in range(seq + 1)}
 
 
 def delivery(session, agents, seconds=None):
-    """Everything played is in the journal, once and as it was; so is all that was ever acknowledged."""
+    """Every played keyframe is in the journal, once and unchanged; so is every keyframe that was ever acknowledged."""
     journalled, wrong = Counter(), 0
     stored = played(agents, seconds)
     for id, _, data in whole_keyframes(session.journal):
@@ -54,7 +54,7 @@ def delivery(session, agents, seconds=None):
 
 
 def same_map(session, calm):
-    """Groups and error as in the undisturbed session."""
+    """Groups and error are those of the undisturbed session."""
     rows = [Row("groups", ", ".join("+".join(map(str, group)) for group in session.groups()),
                 session.groups() == calm.groups())]
     return rows + same_ate(session.report()["ate_joint_m"], calm.report()["ate_joint_m"], "")
@@ -62,14 +62,14 @@ def same_map(session, calm):
 
 def same_ate(ate, calm, what):
     if calm is None:
-        return []  # no ground truth
+        return []  # without ground truth
     change = float("inf") if ate is None else ate - calm
     return [Row(f"joint ATE{what}, m (change, mm)", f"{ate or float('nan'):.4f} ({1000 * change:+.2f})",
                 abs(change) <= MAX_CHANGE_M)]
 
 
 def replays(session, calm, agents):
-    """A replay is a session in which nobody died, of keyframes in the same order."""
+    """A replay equals a session without kills, with the keyframes in the same order."""
     once, twice = session.replay("replay_1"), session.replay("replay_2")
     same = same_files(once, twice)
     rows = [Row("its journal replays twice to equal bytes", "yes" if same else "no", same)]
@@ -81,7 +81,7 @@ def replays(session, calm, agents):
 
 
 def kills(session, planned):
-    """Planned deaths happened, and no others."""
+    """All planned kills happened, and no others."""
     wanted = Counter(fault.split("kill: ")[1] for fault in planned if "kill: " in fault)
     restarts = Counter(session.restarts())
     return [Row("processes killed", f"{sum(restarts.values())} of {sum(wanted.values())}", restarts == +wanted)]

@@ -1,4 +1,4 @@
-"""What memory the processes take for each keyframe: a whole session, and many keyframes through the link alone."""
+"""Memory that the processes need per keyframe: in a whole session, and for many keyframes through the link alone."""
 
 import shutil
 import time
@@ -8,14 +8,14 @@ from faults_lib.offline import Link, copies, memory_mb
 from faults_lib.session import Session, whole_keyframes
 from link_lib.metrics import keyframes, statuses
 
-LINK_KEYFRAMES = 20000  # four hours' walk
+LINK_KEYFRAMES = 20000  # a walk of four hours
 PLAYED_PER_S = 100
-# A keyframe is 26 kB; what the link keeps of one that is delivered (where it lies in the journal) is some 150 bytes.
+# A keyframe has 26 kB; for a delivered one the link keeps its place in the journal, some 150 bytes.
 MAX_LINK_KB = 1
 
 
 class Samples:
-    """Resident memory (MB) of a process against the number of keyframes there were."""
+    """Resident memory (MB) of a process as a function of the number of keyframes."""
 
     def __init__(self):
         self.points = []
@@ -24,12 +24,12 @@ class Samples:
         self.points.append((keyframes, mb))
 
     def at(self, share):
-        """When this share of the keyframes was there."""
+        """Memory (MB) when this share of the keyframes had arrived."""
         wanted = share * self.points[-1][0]
         return next(mb for keyframes, mb in self.points if keyframes >= wanted)
 
     def kb_per_keyframe(self, begin):
-        """From this share of the keyframes to the very end, when all is worked off."""
+        """Growth per keyframe (kB) from this share of the keyframes to the end, when all work is done."""
         last, mb = self.points[-1]
         return 1e3 * (mb - self.at(begin)) / ((1 - begin) * last)
 
@@ -43,13 +43,13 @@ def table(samples):
 
 
 def flat(name, process):
-    """Once all that is of fixed size has been taken."""
+    """In the second half all memory of fixed size is allocated already, so the growth is bounded."""
     growth = process.kb_per_keyframe(0.5)
     return Row(f"kB a keyframe of {name} in the 2nd half (at most {MAX_LINK_KB})", f"{growth:.2f}", growth <= MAX_LINK_KB)
 
 
 def whole_session(options):
-    """The server's processes need memory for the map; it is shown, and has no bound."""
+    """The server's processes need memory for the map; it is shown, but not bounded."""
     folder = options.work / "memory"
     shutil.rmtree(folder, ignore_errors=True)
     session = Session(folder, options.bin, options.agents, (), options.seconds).run()
@@ -73,12 +73,12 @@ def whole_session(options):
 
 
 def arrivals(log):
-    """When each keyframe was first heard on the server's bus, wall clock."""
+    """Wall-clock time at which each keyframe first arrived on the server's bus."""
     return sorted(utime for utime, _, _ in keyframes(log).values())
 
 
 def long_link(options):
-    """Keyframes through one uplink and the handler, hours of them in minutes."""
+    """Keyframes through one uplink and the handler; those of hours are sent in minutes."""
     agent = options.agents[0]
     link = Link(options.work / "memory_link", options.bin, agent.id)
     log = link.folder / "stored.lcm"

@@ -1,4 +1,4 @@
-"""Hours without a server: the uplink spools to disk, is killed, and delivers all when the server is there."""
+"""Hours without a server: the uplink spools to disk, is killed, and delivers everything when the server is back."""
 
 import os
 import shutil
@@ -12,19 +12,19 @@ from faults_lib.checks import Row, print_rows
 from faults_lib.session import whole_keyframes
 from link_lib.metrics import LCM_SYNC
 
-OFFLINE_KEYFRAMES = 5000  # an hour's walk
+OFFLINE_KEYFRAMES = 5000  # a walk of an hour
 PLAYED_PER_S = 100
 CATCH_UP_TIMEOUT_S = 600
 
 
 def copies(log, agent, count, out):
-    """`count` keyframes as one agent's, in ascending maps: the stored ones again and again. id: encoded bytes."""
+    """{id: encoded bytes} of `count` keyframes of one agent: the stored ones repeated in ascending maps; writes them to `out`."""
     stored = [(id, bytearray(data)) for id, _, data in whole_keyframes(log) if id[0] == agent]
     made = {}
     with open(out, "wb") as file:
         for number in range(count):
             copy, (_, data) = number // len(stored), stored[number % len(stored)]
-            struct.pack_into(">q", data, 12, 1000 + copy)  # map: when it was opened
+            struct.pack_into(">q", data, 12, 1000 + copy)  # opened_utime of the map
             struct.pack_into(">q", data, 24, int(1e6 * number / PLAYED_PER_S))  # utime
             channel = f"KEYFRAME_{agent}".encode()
             file.write(struct.pack(">IqqII", LCM_SYNC, number, 0, len(channel), len(data)) + channel + data)
@@ -38,7 +38,7 @@ def memory_mb(process):
 
 
 class Link:
-    """One agent's processes and a handler, started and ended by hand."""
+    """One agent's processes and a handler, started and stopped by the test."""
 
     def __init__(self, folder, bin, agent):
         shutil.rmtree(folder, ignore_errors=True)
@@ -98,7 +98,7 @@ def run(options):
                 uplink.send_signal(signal.SIGKILL)
                 uplink.wait()
                 uplink, kills = link.uplink(), kills + 1
-        # The uplink is the only one who has them.
+        # From now on only the uplink's spool has them.
         player.kill()
         player.wait()
         uplink.kill()

@@ -1,4 +1,4 @@
-"""A whole session of programs built with a sanitizer: none of them may report anything."""
+"""A whole session of programs built with a sanitizer: none of them may report an error."""
 
 import dataclasses
 import shutil
@@ -20,14 +20,14 @@ def sanitizers(bin, program):
 
 
 def environment(reports):
-    """Reports go to files, a process each, and change nothing about how a process ends."""
+    """Reports go to files, one per process, and do not change a process's exit code."""
     to = f"log_path={reports}/report"
     return {"TSAN_OPTIONS": f"suppressions={SUPPRESSIONS}:exitcode=0:{to}", "ASAN_OPTIONS": f"exitcode=0:{to}",
             "UBSAN_OPTIONS": f"print_stacktrace=1:{to}"}
 
 
 def what(report):
-    """The lines of a report that say what was found."""
+    """The lines of a report that describe the error."""
     return [line.strip() for line in report.read_text(errors="replace").splitlines()
             if line.startswith("SUMMARY:") or ": runtime error:" in line]
 

@@ -1,4 +1,4 @@
-"""The scenarios: each runs its session and says whether all its claims hold; None when it cannot run here."""
+"""The scenarios: each runs its session and returns whether all its claims hold; None if it cannot run here."""
 
 import shutil
 from collections import Counter
@@ -10,7 +10,7 @@ from faults_lib.session import SECOND_STARTS_AFTER_S, Agent, Session, random_kil
 
 
 def length_s(options):
-    """Of the session: until its last agent is done."""
+    """Length of the session: until its last agent has ended."""
     ends = []
     for index, agent in enumerate(options.agents):
         times = [own for id, own, _ in whole_keyframes(agent.log) if id[0] == agent.id]
@@ -26,7 +26,7 @@ def session(options, name, faults=(), **more):
 
 
 def calm(options):
-    """The undisturbed session, made once."""
+    """The undisturbed session; it is run only once."""
     if not hasattr(options, "calm"):
         options.calm = session(options, "calm").run()
         if options.calm.exit_code != 0:
@@ -51,7 +51,7 @@ def run_kills(options):
 
 
 def run_disk_full(options):
-    """RLIMIT_FSIZE: no root, no disk to fill."""
+    """Uses RLIMIT_FSIZE, so it needs neither root nor a full disk."""
     begin = length_s(options) / 3
     planned = [f"at: {begin:.1f}, disk_full: agent_handler, seconds: 10"]
     disturbed = session(options, "disk_full", planned).run()

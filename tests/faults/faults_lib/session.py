@@ -1,4 +1,4 @@
-"""A session of stored keyframes with faults: its file, its run, and what it left."""
+"""A session of stored keyframes with faults: its file, its run, and its results."""
 
 import json
 import os
@@ -18,13 +18,13 @@ SECOND_STARTS_AFTER_S = 2  # so that the same map is the first in every journal
 @dataclass
 class Agent:
     id: int
-    log: Path  # keyframes; empty: vio runs on the recording
+    log: Path  # of keyframes; empty: vio runs on the recording
     recording: Path = None
     link: str = ""
 
 
 def random_kills(seed, count, begin_s, end_s, agents):
-    """`count` kills of server processes and uplinks, at random times, the same for the same seed."""
+    """`count` kills of server processes and uplinks at random times, which depend only on the seed."""
     generator = random.Random(seed)
     names = [*SERVER, *(f"uplink_{agent.id}" for agent in agents)]
     times = sorted(generator.uniform(begin_s, end_s) for _ in range(count))
@@ -45,7 +45,7 @@ def session_yaml(agents, faults, seconds=None):
 
 
 class Session:
-    """Run once in `folder`, and read from it then."""
+    """A session that is run once in `folder`; its results are read from there."""
 
     def __init__(self, folder, bin, agents, faults=(), seconds=None, rate="1", environment=None):
         self.environment = os.environ | (environment or {})
@@ -74,7 +74,7 @@ class Session:
         return {name: process.get("restarts", 0) for name, process in self.report()["processes"].items()}
 
     def summaries(self, process):
-        """What a server process said of itself, for people."""
+        """The summaries in a server process's statuses."""
         return [said["summary"] for _, said in statuses(self.out / "session.lcm", process)]
 
     def replay(self, name):
@@ -85,7 +85,7 @@ class Session:
 
 
 def played(agents, seconds=None):
-    """(agent, map, seq): encoded bytes, of the stored keyframes that are played."""
+    """(agent, map, seq): encoded bytes, for the stored keyframes that are played."""
     found = {}
     for agent in agents:
         of_agent = {id: (own, data) for id, own, data in whole_keyframes(agent.log) if id[0] == agent.id}
@@ -95,7 +95,7 @@ def played(agents, seconds=None):
 
 
 def whole_keyframes(log):
-    """(agent, map, seq), its own time, encoded bytes: of every keyframe in the log."""
+    """(agent, map, seq), its own time, encoded bytes: for every keyframe in the log."""
     for _, channel, data in events(log):
         if channel.startswith("KEYFRAME_"):
             agent, opened, seq, own = struct.unpack_from(">8xiqiq", data)
@@ -109,7 +109,7 @@ def positions(tum):
 
 
 def rms_m(tum, other):
-    """Between the same keyframes of two trajectories; infinite if they are not the same."""
+    """Root mean square distance between the keyframes of two trajectories; infinite if the keyframes differ."""
     a, b = positions(tum), positions(other)
     if a.keys() != b.keys() or not a:
         return float("inf")
