@@ -1,9 +1,11 @@
 // Both roles of the bridge against a real nats-server.
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <fstream>
 #include <functional>
 #include <thread>
 
@@ -249,6 +251,25 @@ TEST_F(Bridge, SaysWhatIsWrongWithNats) {
   EXPECT_THAT(why(nats_->access(), "the hall"),
               HasSubstr("--site the hall: give a name of letters"));
   EXPECT_THAT(why(nats_->access(), "hall"), IsEmpty());
+}
+
+TEST_F(Bridge, TakesNoNatsServerOfSmallMessages) {
+  const std::string folder = testing::TempDir() + "/nats_small";
+  const int port = FreePort();
+  std::ofstream(folder + ".conf") << fmt::format(
+      "listen: 127.0.0.1:{}\njetstream {{store_dir: \"{}\"}}\nmax_payload: 100000\n", port, folder);
+  const Program server({NatsServerProgram(), "-c", folder + ".conf", "-l", folder + ".log"});
+  std::string why;
+  for (int i = 0; i < 100 && (why.empty() || why.starts_with("cannot reach")); ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    try {
+      NatsClient({fmt::format("nats://127.0.0.1:{}", port), {}, {}}, "test");
+    } catch (const std::runtime_error& error) {
+      why = error.what();
+    }
+  }
+  EXPECT_THAT(why, HasSubstr("takes messages of 100000 bytes"));
+  EXPECT_THAT(why, HasSubstr("raise max_payload"));
 }
 
 }  // namespace

@@ -129,7 +129,7 @@ bool JournalShipper::ShipEvent(const LogPiece& event) {
         return true;
       case SiteStreams::Stored::kTooLarge:
         ++num_too_large_;
-        return true;
+        return false;  // else agents would be told that other hosts have it
       case SiteStreams::Stored::kUnreachable:
         return false;
       case SiteStreams::Stored::kOtherwise:

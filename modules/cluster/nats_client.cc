@@ -20,6 +20,8 @@ constexpr int64_t kMaxUnacknowledged = 100'000;  // NATS' own default would stop
 constexpr char kUtimeHeader[] = "Pangea-Utime";
 constexpr char kExpectedOfStream[] = "Nats-Expected-Last-Sequence";
 constexpr char kExpectedOfSubject[] = "Nats-Expected-Last-Subject-Sequence";
+// More than the largest event of a journal; nats-server's own default is four times as much.
+constexpr int64_t kMinPayload = 256 * 1024;
 // How long a NATS cluster that was just started may take to elect its leader.
 constexpr std::chrono::seconds kLongestChoice{20};
 
@@ -200,6 +202,12 @@ NatsClient::NatsClient(const NatsAccess& access, const std::string& name)
   impl_->connection.reset(connection);
   if (status != NATS_OK) {
     throw std::runtime_error(WhyNotConnected(status, access));
+  }
+  if (const int64_t payload = natsConnection_GetMaxPayload(connection); payload < kMinPayload) {
+    throw std::runtime_error(
+        fmt::format("NATS at {} takes messages of {} bytes, and a site needs {}: raise max_payload "
+                    "in its configuration",
+                    access.url, payload, kMinPayload));
   }
   jsOptions wait{};
   jsOptions_Init(&wait);

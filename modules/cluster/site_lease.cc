@@ -25,9 +25,13 @@ bool SiteLease::Write(const std::string& record, uint64_t behind, int64_t now_ut
 bool SiteLease::TryAcquire(int64_t now_utime) {
   const auto newest = streams_.LeaseSequence();
   if (newest != seen_) {
+    const auto record = streams_.FindLease();
+    if (newest && *newest > 0 && !record) {
+      return false;  // somebody has it, and NATS does not say who
+    }
     seen_ = newest;
     seen_utime_ = now_utime;
-    seen_holder_ = newest ? streams_.FindLease().value_or(kNobody) : kNobody;
+    seen_holder_ = record.value_or(kNobody);
   }
   const bool free = newest && (seen_holder_ == kNobody || seen_holder_ == holder_ ||
                                now_utime - seen_utime_ >= kHeld_us);

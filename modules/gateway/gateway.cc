@@ -18,7 +18,8 @@ using web::WebAnswer;
 using web::WebRequest;
 
 WebAnswer Json(int status, const json& body) {
-  return {status, "application/json", body.dump() + "\n"};
+  return {status, "application/json",
+          body.dump(-1, ' ', false, json::error_handler_t::replace) + "\n"};
 }
 
 WebAnswer Error(int status, const std::string& error) { return Json(status, {{"error", error}}); }

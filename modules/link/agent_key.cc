@@ -227,7 +227,8 @@ bool KeyFolder::Changed() const {
 bool KeyFolder::IsGone(int32_t agent_id) const {
   const auto file = files_.find(agent_id);
   std::error_code error;
-  return file == files_.end() || !fs::exists(file->second, error);
+  // A file that cannot be looked at just now is not gone.
+  return file == files_.end() || fs::status(file->second, error).type() == fs::file_type::not_found;
 }
 
 const AgentKey* KeyFolder::LastOf(const fs::path& file) const {

@@ -99,7 +99,8 @@ bool EditSpool::Write(const AnchorEdit& edit) const {
   if (fd < 0) {
     return false;
   }
-  const bool written = WriteFully(fd, 0, bytes.data(), bytes.size());
+  // On the disk before it takes the place of an earlier edit that is there.
+  const bool written = WriteFully(fd, 0, bytes.data(), bytes.size()) && fdatasync(fd) == 0;
   const bool closed = close(fd) == 0;
   std::error_code error;
   if (written && closed) {

@@ -2,6 +2,7 @@
 
 #include <arpa/inet.h>
 #include <fmt/format.h>
+#include <strings.h>
 
 #include <algorithm>
 #include <array>
@@ -19,6 +20,11 @@ bool IsAddress(const std::string& text) {
     return inet_pton(AF_INET6, text.substr(1, text.size() - 2).c_str(), address.data()) == 1;
   }
   return inet_pton(AF_INET, text.c_str(), address.data()) == 1;
+}
+
+// Names of hosts have no case, and browsers send them in small letters (RFC 4343).
+bool IsSameName(const std::string& a, const std::string& b) {
+  return strcasecmp(a.c_str(), b.c_str()) == 0;
 }
 
 bool IsPort(std::string_view text) {
@@ -39,8 +45,8 @@ bool HostAllowed(std::string_view host, const std::vector<std::string>& names) {
     return false;
   }
   const std::string name(has_port ? host.substr(0, colon) : host);
-  return name == "localhost" || IsAddress(name) ||
-         std::find(names.begin(), names.end(), name) != names.end();
+  return IsSameName(name, "localhost") || IsAddress(name) ||
+         std::ranges::any_of(names, [&name](const auto& other) { return IsSameName(name, other); });
 }
 
 bool OriginAllowed(std::string_view origin, std::string_view host) {

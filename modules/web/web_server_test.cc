@@ -23,9 +23,10 @@ using testing::Not;
 using testing::StartsWith;
 
 TEST(WebRules, HostsThatAreThisMachine) {
-  const std::vector<std::string> names = {"robot.local"};
-  for (const char* host : {"localhost", "localhost:8080", "127.0.0.1:8080", "192.168.1.7", "[::1]",
-                           "[::1]:8080", "robot.local:8080"}) {
+  const std::vector<std::string> names = {"robot.local", "DESKTOP-7.local"};
+  for (const char* host :
+       {"localhost", "LocalHost:1", "desktop-7.local:8443", "Robot.local", "localhost:8080",
+        "127.0.0.1:8080", "192.168.1.7", "[::1]", "[::1]:8080", "robot.local:8080"}) {
     EXPECT_TRUE(HostAllowed(host, names)) << host;
   }
   for (const char* host :

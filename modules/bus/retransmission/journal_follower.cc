@@ -218,11 +218,12 @@ bool JournalFollower::ReadPiece() {
     if (checkpoint_.place.writes) {
       WriteCheckpoint();
     }
-  } catch (const std::runtime_error& error) {
+  } catch (const JournalUnreadable& error) {
     if (checkpoint_.place.writes) {
       throw;
     }
     Log(node_.name(), fmt::format("the rest of the journal comes over the bus: {}", error.what()));
+    named_.clear();  // so that the results of these maps are asked for
   }
   EndReading();
   return false;

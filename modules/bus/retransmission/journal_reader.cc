@@ -72,9 +72,17 @@ void JournalReader::StartBehind(const JournalState& state) {
   Rewind();
 }
 
+std::optional<LogPiece> JournalReader::NextPiece() {
+  try {
+    return scan_.Next();
+  } catch (const std::runtime_error& error) {
+    throw JournalUnreadable(error.what());
+  }
+}
+
 bool JournalReader::Next(const Handler& handler) {
   for (const int64_t end = at_ + kPieceBytes; at_ < end;) {
-    const auto piece = scan_.Next();
+    const auto piece = NextPiece();
     if (!piece) {
       return false;
     }

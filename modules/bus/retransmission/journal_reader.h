@@ -6,12 +6,19 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
+#include <stdexcept>
 #include <string>
 
 #include "log_file/log_scan.h"
 #include "messages/catch_up_messages.h"
 
 namespace pangea {
+
+// The disk cannot be read.
+class JournalUnreadable : public std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
 
 class JournalReader {
  public:
@@ -29,13 +36,14 @@ class JournalReader {
   // Returns whether it takes the event. If not, reading ends before this event.
   using Handler = std::function<bool(const std::string& channel, Bytes data, int64_t offset)>;
   // Gives the events of about the next kPieceBytes to the handler. False when no event is left or
-  // one was not taken. Throws std::runtime_error when the disk cannot be read.
+  // one was not taken. Throws JournalUnreadable, and what the handler throws.
   bool Next(const Handler& handler);
   // Starts again at the beginning, or behind the state that StartBehind was given.
   void Rewind();
 
   int64_t bytes_left() const { return state_.num_bytes - at_; }
-  // The state of the journal when it ended with the last event read. Throws as Next does.
+  // The state of the journal when it ended with the last event read. Throws std::runtime_error
+  // when the disk cannot be read.
   JournalState position() const;
 
  private:
@@ -43,6 +51,7 @@ class JournalReader {
 
   // Throws std::runtime_error unless the file has the last event of `state` where `state` says.
   void Check(const JournalState& state) const;
+  std::optional<LogPiece> NextPiece();
 
   int fd_ = -1;
   const JournalState state_;

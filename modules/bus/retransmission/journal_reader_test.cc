@@ -129,7 +129,12 @@ struct Follower {
                          std::to_string(request.to_seq));
     });
   }
-  void Took(const char* what, int32_t seq) { taken += what + std::to_string(seq) + " "; }
+  void Took(const char* what, int32_t seq) {
+    if (fails) {
+      throw std::runtime_error("the process cannot go on");
+    }
+    taken += what + std::to_string(seq) + " ";
+  }
   void Tell(const JournalFile& file) {
     PublishMessage(bus, "JOURNAL_FILE", ToMessage(file));
     bus.Drain();
@@ -151,6 +156,7 @@ struct Follower {
 
   IdleBus bus;
   Node node;
+  bool fails = false;
   std::string taken;
   std::vector<std::string> requests;
   JournalFollower journal;
@@ -205,6 +211,15 @@ TEST(JournalReader, WhileTheFileIsReadNothingIsAskedFor) {
   EXPECT_FALSE(CounterOf(follower.node.Status(0, 0, ""), "ready_utime"));
   follower.bus.DoAll();
   EXPECT_EQ(follower.journal.next(kMap), 2000);
+}
+
+TEST(JournalReader, AnErrorOfTheProcessIsNotTakenForOneOfTheFile) {
+  TestJournal journal;
+  journal.AddKeyframes(3);
+  Follower follower(kAll);
+  follower.Tell(journal.file());
+  follower.fails = true;
+  EXPECT_THROW(follower.bus.DoAll(), std::runtime_error);
 }
 
 TEST(JournalReader, TheStatesOfItsMapsAreAwaited) {

@@ -1,6 +1,9 @@
 #include "session/processes/kept_processes.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <stdexcept>
 #include <utility>
 
 namespace pangea::session {
@@ -46,19 +49,32 @@ std::vector<KeptProcesses::Revived> KeptProcesses::Revive() {
     if (!exit) {
       continue;
     }
-    const std::string name = kept.child->name();
-    const std::string why = kept.child->HowItEnded();
+    std::string why = kept.child->HowItEnded();
     if (!std::exchange(kept.expects_end, false)) {
       ++kept.unexpected;
       kept.given_up =
           kept.quick_deaths.Note(why, kept.child->RanSeconds()) || kept.unexpected > kMaxRestarts;
     }
+    const bool waited = std::exchange(kept.waits, false);
     if (!kept.given_up) {
-      kept.child.emplace(name, kept.argv, LogOf(name));
+      StartAgain(&kept, &why);
     }
-    revived.push_back({name, why, kept.given_up, kept.unexpected});
+    if (!waited || !kept.waits) {
+      revived.push_back({kept.child->name(), why, kept.given_up, kept.unexpected});
+    }
   }
   return revived;
+}
+
+// If the machine has no room for another process or log just now, the next Revive tries again.
+void KeptProcesses::StartAgain(Kept* kept, std::string* why) const {
+  try {
+    const std::string name = kept->child->name();
+    kept->child.emplace(ChildProcess(name, kept->argv, LogOf(name)));
+  } catch (const std::runtime_error& error) {
+    *why += fmt::format("; it waits to be started: {}", error.what());
+    kept->waits = kept->expects_end = true;
+  }
 }
 
 bool KeptProcesses::GivenUp(const std::string& name) const {

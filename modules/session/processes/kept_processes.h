@@ -63,7 +63,9 @@ class KeptProcesses {
     int unexpected = 0;
     bool expects_end = false;
     bool given_up = false;
+    bool waits = false;  // the last attempt to start it again failed
   };
+  void StartAgain(Kept* kept, std::string* why) const;
   std::filesystem::path LogOf(const std::string& name) const;
 
   std::filesystem::path logs_;

@@ -78,6 +78,33 @@ TEST_F(KeptProcessesTest, OneThatCannotStartIsGivenUpSoon) {
   kept_.StopAll(5);
 }
 
+TEST_F(KeptProcessesTest, OneWhoseLogCannotBeOpenedWaitsForIt) {
+  const std::filesystem::path logs =
+      std::filesystem::path(testing::TempDir()) / "kept_processes_logs";
+  std::filesystem::remove_all(logs);
+  std::filesystem::create_directory(logs);
+  KeptProcesses kept(logs);
+  kept.Start("kept_sleeps", {"/bin/sleep", "100"});
+  std::filesystem::remove_all(logs);
+  kept.Find("kept_sleeps")->Signal(SIGKILL);
+  std::vector<KeptProcesses::Revived> revived;
+  while (revived.empty()) {
+    revived = kept.Revive();
+  }
+  EXPECT_THAT(revived.front().why, HasSubstr("cannot write"));
+  EXPECT_FALSE(revived.front().given_up);
+  for (int i = 0; i < 2 * KeptProcesses::kMaxRestarts; ++i) {
+    EXPECT_TRUE(kept.Revive().empty()) << "it is told once";
+  }
+  EXPECT_FALSE(kept.Find("kept_sleeps")->running());
+  std::filesystem::create_directory(logs);
+  revived = kept.Revive();
+  ASSERT_EQ(revived.size(), 1u);
+  EXPECT_EQ(revived.front().unexpected, 1);
+  EXPECT_TRUE(kept.Find("kept_sleeps")->running());
+  kept.StopAll(5);
+}
+
 TEST(QuickDeaths, AreInARowAndOfOneReason) {
   QuickDeaths deaths;
   EXPECT_FALSE(deaths.Note("a", 1));
