@@ -30,15 +30,25 @@ export class Connection {
       this.onState(true);
     };
     socket.onmessage = ({ data }: MessageEvent<ArrayBuffer>) => {
-      this.bytes += data.byteLength;
-      const update = decode(data);
-      this.onUpdate(update);
-      this.say({ taken: update.version });
+      try {
+        this.take(data);
+      } catch (error) {
+        // The server waits until the update is taken, so the page would stay as it is. A new socket gets everything again.
+        console.error(error);
+        socket.close();
+      }
     };
     socket.onclose = () => {
       this.open = false;
       this.onState(false);
       setTimeout(() => this.connect(), kRetry_ms);
     };
+  }
+
+  private take(data: ArrayBuffer) {
+    this.bytes += data.byteLength;
+    const update = decode(data);
+    this.onUpdate(update);
+    this.say({ taken: update.version });
   }
 }

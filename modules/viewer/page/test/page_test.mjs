@@ -55,6 +55,7 @@ async function testLog(browser) {
   await testBeforeAfter(page);
   await screenshot(page, "fused");
   await testSeekBack(page);
+  await testBrokenUpdate(page);
 
   for (const [name, context] of [
     ["dark", { colorScheme: "dark" }],
@@ -72,6 +73,23 @@ async function testLog(browser) {
   await page.close();
   viewer.removeAllListeners("exit");
   viewer.kill();
+}
+
+// An update that the page fails to show must not freeze it.
+async function testBrokenUpdate(page) {
+  await page.evaluate(() => {
+    const { stage } = pangea;
+    stage.take = () => {
+      delete stage.take; // the class's own one is back
+      throw new Error("broken by the test");
+    };
+  });
+  await seek(page, 0.2);
+  await becomes(page, "an update breaks the page: it connects anew, and goes on", () =>
+    Math.abs(pangea.model.now_s - 0.2 * pangea.model.start.end_s) < 0.3 && !Object.hasOwn(pangea.stage, "take") &&
+    document.getElementById("connection").textContent === "" && pangea.model.numKeyframes > 0);
+  await seek(page, 1);
+  await becomes(page, "and gets the rest", () => pangea.model.numKeyframes === 63);
 }
 
 // Hovering over a constraint's line must show its verification result. Lines may overlap, so any of them will do.
@@ -330,4 +348,4 @@ await run(async () => {
   await testLive(browser);
   await testTwelve(browser);
   await browser.close();
-});
+}, /broken by the test/);
