@@ -5,6 +5,7 @@ import { agentColour, colours } from "../../../web/page/palette";
 import { byId } from "./dom";
 import { People } from "./people";
 import { filesOf, filesOfDrop, filesOfZip } from "./recording/files";
+import type { Recorder } from "./recording/recorder";
 import { saveRecording } from "./recording/save";
 import { onTap } from "./ui/anchor_taps";
 import { clearNotice, notice } from "./ui/notice";
@@ -23,7 +24,7 @@ const self = () => welcome.membership?.agent ?? 0;
 const visit = new Visit(
   stage,
   () => welcome.admit(),
-  { onEnter, onLeave, onPose: (pose) => panels.drawMap(pose), onNotice: notice },
+  { onEnter, onLeave, onPose: (pose) => panels.drawMap(pose), onRecorded, onNotice: notice },
   { ownOdometry: options.get("odometry") === "own", realTime: options.get("rate") !== "max" },
 );
 const panels = new Panels(visit, people, self, colourOf);
@@ -38,10 +39,15 @@ function onLeave() {
   welcome.show();
 }
 
-function attempt(what: Promise<void>) {
+function onRecorded(recorder: Recorder) {
+  panels.showRecording();
+  attempt(recorder.finish().then((zip) => saveRecording(zip, recorder.name, welcome.membership, notice)));
+}
+
+// Tells the visitor why it failed.
+function attempt(what: Promise<void>): Promise<void> {
   clearNotice();
-  what.catch((error: Error) => {
-    visit.leave();
+  return what.catch((error: Error) => {
     notice(error.name === "NotAllowedError" ? "The browser does not let the page use the camera: allow it in its settings." : error.message);
   });
 }
@@ -50,19 +56,15 @@ function attempt(what: Promise<void>) {
 
 byId("join").addEventListener("submit", (event) => {
   event.preventDefault();
-  attempt(visit.startLive());
+  const start = byId<HTMLButtonElement>("start");
+  start.disabled = true;
+  void attempt(visit.startLive()).finally(() => (start.disabled = false));
 });
 byId("stop").onclick = () => visit.leave();
-byId("record").onclick = async () => {
-  const { walk } = visit;
-  if (!walk) return;
-  const { recorder } = walk;
-  if (!recorder) walk.startRecording();
-  byId("record").textContent = recorder ? "Record" : "Save";
-  byId("record").classList.toggle("recording", !recorder);
-  if (!recorder) return;
-  walk.recorder = undefined;
-  await saveRecording(await recorder.finish(), recorder.name, welcome.membership, notice);
+byId("record").onclick = () => {
+  if (visit.walk?.recorder) return visit.finishRecording();
+  visit.walk?.startRecording();
+  panels.showRecording();
 };
 picture.addEventListener("click", ({ clientX, clientY }) => {
   const ownerName = (owner: number) => (owner === self() ? undefined : people.nameOf(owner));

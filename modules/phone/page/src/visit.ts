@@ -6,6 +6,7 @@ import type { Membership } from "./messages";
 import { isCalibrated, openRecording, withCamera } from "./recording/euroc";
 import type { CalibratedRecording, Recording } from "./recording/euroc";
 import type { Files } from "./recording/files";
+import type { Recorder } from "./recording/recorder";
 import { roughCalibration, storeCalibration, storedCalibration } from "./sensors/calibration";
 import type { CameraKind } from "./sensors/calibration";
 import { Camera } from "./sensors/camera";
@@ -20,6 +21,7 @@ export interface VisitEvents {
   onEnter(): void; // from now on a camera image is shown
   onLeave(): void;
   onPose(pose: AgentPose): void;
+  onRecorded(recorder: Recorder): void; // a recording has ended and is to be saved
   onNotice(text: string): void;
 }
 
@@ -38,6 +40,7 @@ export class Visit {
   private xr?: XrOdometry;
   private xrFails = false;
   private readonly hasXr: Promise<boolean>;
+  private run = 0; // number of the newest start; a start that was overtaken, or left, stops what it has opened and ends
   private endCalibration = (_cameraYaml: string | undefined) => {};
   private readonly walkEvents: WalkEvents;
 
@@ -58,39 +61,27 @@ export class Visit {
   }
 
   // Must be called within a tap.
-  async startLive() {
-    this.endCalibration(undefined);
-    if (!this.xrFails && (await this.hasXr) && (await this.startXr())) return;
-    await askForMotion(); // before all else, because iOS asks only within the tap
-    const membership = await this.begin(true);
-    const sensor = await Camera.open();
-    this.camera = sensor.kind;
-    await keepAwake();
-    const cameraYaml = storedCalibration(this.camera) ?? (await this.calibrateLive(sensor, this.camera));
-    if (!cameraYaml) return;
-    this.walk = Walk.live(sensor, cameraYaml, membership, this.stage, this.walkEvents);
-    this.events.onEnter();
+  startLive(): Promise<void> {
+    return this.start((run) => this.openLive(run));
   }
 
-  async startRecorded(files: Files) {
-    const recording = await openRecording(files);
-    this.endCalibration(undefined);
-    const membership = await this.begin(false);
-    const calibrated = isCalibrated(recording) ? recording : await this.calibrateRecording(recording);
-    if (!calibrated) return;
-    const onProgress = (share: number) => (this.playedShare = share);
-    this.walk = Walk.play(calibrated, this.options.realTime, membership, this.stage, this.walkEvents, onProgress);
-    this.events.onEnter();
+  startRecorded(files: Files): Promise<void> {
+    return this.start((run) => this.openRecorded(run, files));
   }
 
   leave() {
-    this.endCalibration(undefined);
+    this.supersede();
     this.walk?.stop();
-    const device = this.xr;
-    this.xr = undefined;
-    device?.stop();
     this.stage.clear();
     this.events.onLeave();
+  }
+
+  // Hands out the running recording, if there is one. Whatever ends a walk calls it first, so that no recording is lost.
+  finishRecording() {
+    const recorder = this.walk?.recorder;
+    if (!recorder) return;
+    this.walk!.recorder = undefined;
+    this.events.onRecorded(recorder);
   }
 
   // The tab was hidden or is visible again.
@@ -111,23 +102,73 @@ export class Visit {
     storeCalibration(camera, yaml);
   }
 
-  private async begin(isLive: boolean): Promise<Membership | undefined> {
+  // A start that fails leads back, unless it was overtaken: then nobody waits for it, and the newer walk goes on.
+  private async start(open: (run: number) => Promise<void>) {
+    const run = this.supersede();
+    try {
+      await open(run);
+    } catch (error) {
+      if (run !== this.run) return;
+      this.leave();
+      throw error;
+    }
+  }
+
+  // Ends starts that are under way, the recording and the device's session. Returns the number of the next start.
+  private supersede(): number {
+    const run = ++this.run;
+    this.finishRecording();
+    this.endCalibration(undefined);
+    const device = this.xr;
+    this.xr = undefined;
+    device?.stop();
+    return run;
+  }
+
+  private async openLive(run: number) {
+    if (!this.xrFails && (await this.hasXr) && (await this.startXr(run))) return;
+    await askForMotion(); // before all else, because iOS asks only within the tap
+    const membership = await this.begin(run, true);
+    if (run !== this.run) return;
+    const sensor = await Camera.open();
+    if (run !== this.run) return sensor.stop();
+    this.camera = sensor.kind;
+    void keepAwake();
+    const cameraYaml = storedCalibration(this.camera) ?? (await this.calibrateLive(sensor, this.camera));
+    if (!cameraYaml) return;
+    if (run !== this.run) return sensor.stop();
+    this.walk = Walk.live(sensor, cameraYaml, membership, this.stage, this.walkEvents);
+    this.events.onEnter();
+  }
+
+  private async openRecorded(run: number, files: Files) {
+    const recording = await openRecording(files);
+    const membership = await this.begin(run, false);
+    if (run !== this.run) return;
+    const calibrated = isCalibrated(recording) ? recording : await this.calibrateRecording(run, recording);
+    if (!calibrated || run !== this.run) return;
+    const onProgress = (share: number) => (this.playedShare = share);
+    this.walk = Walk.play(calibrated, this.options.realTime, membership, this.stage, this.walkEvents, onProgress);
+    this.events.onEnter();
+  }
+
+  private async begin(run: number, isLive: boolean): Promise<Membership | undefined> {
+    if (run !== this.run) return;
     const membership = await this.admit();
+    if (run !== this.run) return;
     await this.walk?.close();
+    if (run !== this.run) return;
     this.walk = undefined;
     this.isLive = isLive;
     return membership;
   }
 
   // False if it does not work, for instance if the browser gives no images; then our odometry is used.
-  private async startXr(): Promise<boolean> {
-    try {
-      this.xr = await XrOdometry.open(this.stage.overlay.renderer, document.body);
-    } catch (error) {
-      console.info(`WebXR: ${error}`);
-      return false;
-    }
-    const device = this.xr;
+  private async startXr(run: number): Promise<boolean> {
+    const device = await XrOdometry.open(this.stage.overlay.renderer, document.body).catch((error) => console.info(`WebXR: ${error}`));
+    if (!device) return false;
+    if (run !== this.run) return device.stop(), true;
+    this.xr = device;
     device.onEnd = () => {
       if (!device.hasCamera) this.xrFails = true;
       if (this.xr !== device) return;
@@ -135,11 +176,13 @@ export class Visit {
       if (this.xrFails) this.events.onNotice("AR gives no camera images here. Start again: the page tracks by itself then.");
     };
     const membership = await this.admit();
-    await keepAwake();
+    if (run !== this.run) return true;
+    void keepAwake();
     this.isLive = true;
     device.onCamera = async (cameraYaml) => {
+      const newest = ++this.run; // a screen that is rotated there and back starts two walks
       await this.walk?.close();
-      if (this.xr !== device) return;
+      if (newest !== this.run) return;
       this.walk = Walk.xr(device, cameraYaml, membership, this.stage, this.walkEvents);
       this.events.onEnter();
     };
@@ -150,28 +193,30 @@ export class Visit {
 
   private async calibrateLive(sensor: Camera, kind: CameraKind): Promise<string | undefined> {
     const rough = roughCalibration(kind);
-    const run = CalibrationWalk.live(sensor, parseCamera(rough, "rough"), this.stage);
-    const cameraYaml = await this.calibrate(run, rough).catch((error) => (sensor.stop(), Promise.reject(error)));
+    const walk = CalibrationWalk.live(sensor, parseCamera(rough, "rough"), this.stage);
+    const cameraYaml = await this.calibrate(walk, rough).catch((error) => (sensor.stop(), Promise.reject(error)));
     if (!cameraYaml) sensor.stop();
     else if (cameraYaml !== rough) storeCalibration(kind, cameraYaml);
     return cameraYaml;
   }
 
-  private async calibrateRecording(recording: Recording): Promise<CalibratedRecording | undefined> {
-    const cameraYaml = await this.calibrate(await CalibrationWalk.ofRecording(recording, this.stage));
+  private async calibrateRecording(run: number, recording: Recording): Promise<CalibratedRecording | undefined> {
+    const walk = await CalibrationWalk.ofRecording(recording, this.stage);
+    if (run !== this.run) return void walk.stop();
+    const cameraYaml = await this.calibrate(walk);
     return cameraYaml === undefined ? undefined : withCamera(recording, cameraYaml, "the calibration");
   }
 
   // Undefined if it was ended without a result. `otherwise`: a calibration with which the visitor may continue at once.
-  private async calibrate(run: CalibrationWalk, otherwise?: string): Promise<string | undefined> {
-    this.calibration = run;
+  private async calibrate(walk: CalibrationWalk, otherwise?: string): Promise<string | undefined> {
+    this.calibration = walk;
     this.skipCalibration = otherwise === undefined ? undefined : () => this.endCalibration(otherwise);
     this.events.onEnter();
     const ended = new Promise<string | undefined>((done) => (this.endCalibration = done));
     try {
-      return await Promise.race([run.done, ended]);
+      return await Promise.race([walk.done, ended]);
     } finally {
-      run.stop();
+      walk.stop();
       this.calibration = this.skipCalibration = undefined;
     }
   }

@@ -37,6 +37,7 @@ export class Walk {
   recorder?: Recorder;
   private stopSensors = () => {};
   private readonly client: AgentClient;
+  private closing?: Promise<void>;
   private taken = () => {}; // called when the agent has processed its image
 
   private constructor(
@@ -115,9 +116,10 @@ export class Walk {
     this.endMap();
   }
 
-  async close() {
+  // Starts that overlap close the same walk; they all wait for the same end.
+  close(): Promise<void> {
     this.stopSensors();
-    await this.client.close();
+    return (this.closing ??= this.client.close());
   }
 
   startRecording() {

@@ -13,11 +13,12 @@ const kAlone = 1; // id of an agent without membership, which nobody else sees
 
 const say = (message: FromWorker) => postMessage(message);
 const fail = (error: Error) => say({ kind: "failed", text: String(error.message ?? error) });
+const storageFailed = (error: unknown) => void say({ kind: "storage_failed", text: String(error) });
 const now_us = () => Math.round(1000 * (performance.timeOrigin + performance.now()));
 
 class AgentHost {
   private link?: GatewayLink;
-  private spool?: SpoolStore;
+  private spool?: SpoolStore; // absent without membership, and where the browser has no storage, as in some private windows
   private stored = Promise.resolve(); // resolves when all changes so far are in the spool
   private polling?: ReturnType<typeof setInterval>;
 
@@ -44,8 +45,8 @@ class AgentHost {
   }
 
   private async connect(agent: number, key: string) {
-    this.spool = await SpoolStore.open(`pangea.spool.${agent}`);
-    this.agent.restoreSpool(await this.spool.entries());
+    this.spool = await SpoolStore.open(`pangea.spool.${agent}`).catch(storageFailed);
+    if (this.spool) this.agent.restoreSpool(await this.spool.entries());
     this.link = new GatewayLink(gatewayOrigin(), agent, key, (packet) => this.agent.onLinkDown(packet));
   }
 
@@ -100,7 +101,7 @@ class AgentHost {
   private take(events: AgentEvents) {
     for (const packet of events.linkUp) this.link?.send(packet);
     if (this.spool && events.spool.length > 0) {
-      this.stored = this.spool.apply(events.spool).catch((error) => say({ kind: "storage_failed", text: String(error) }));
+      this.stored = this.spool.apply(events.spool).catch(storageFailed);
     }
     if (events.pose) say({ kind: "pose", pose: events.pose });
     if (events.anchors) say({ kind: "anchors", anchors: events.anchors });

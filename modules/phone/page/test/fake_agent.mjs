@@ -7,8 +7,8 @@ const kMap = "1/1700000000000000";
 const half = Math.SQRT1_2;
 
 // Simulates a bug that the agent itself does not catch.
-function breakIfTold(imuYaml) {
-  if (/breaks/.test(imuYaml)) throw new Error("a bug");
+function breakIfTold(text) {
+  if (/breaks/.test(text)) throw new Error("a bug");
 }
 
 class FakeAgent {
@@ -47,7 +47,9 @@ class FakeAgent {
     this.edits.push(edit);
     return "1/1700000000000001";
   }
-  removeAnchor() {}
+  removeAnchor(id) {
+    breakIfTold(id);
+  }
   poll() {}
   startAnew() {
     ++this.numMaps;

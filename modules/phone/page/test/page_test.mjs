@@ -1,5 +1,5 @@
 // Tests the page in headless Chromium with a fake agent (fake_agent.mjs) and with camera and motion emulated by the browser: drawing,
-// tapping, recording, and playing the recording.
+// tapping, recording, interruptions, and playing the recording.
 
 import { createServer } from "node:http";
 import { readFile } from "node:fs/promises";
@@ -54,6 +54,7 @@ async function serve() {
 }
 
 const screenshot = (page, name) => page.screenshot({ path: `${options.out}/phone_${name}.png` });
+const kPhone = { viewport: { width: 360, height: 720 }, permissions: ["camera", "accelerometer", "gyroscope"] };
 const told = (page) => page.evaluate(() => JSON.parse(pangea.walk.vio.text));
 
 // The motion of a phone that is held upright and rotates about its x axis.
@@ -69,7 +70,7 @@ async function senseMotion(page) {
 }
 
 async function testLive(browser, url) {
-  const page = await openPage(browser, url, { viewport: { width: 360, height: 720 }, permissions: ["camera", "accelerometer", "gyroscope"], hasTouch: true });
+  const page = await openPage(browser, url, { ...kPhone, hasTouch: true });
   await screenshot(page, "welcome");
   check("nothing is wider than a phone", await page.evaluate(() => document.documentElement.scrollWidth <= 360));
   await senseMotion(page);
@@ -83,6 +84,7 @@ async function testLive(browser, url) {
   check("in rad/s and m/s^2", imu.every((value, i) => Math.abs(value - expected[i]) < 0.06), String(imu));
   check("the image has something in it", range[1] - range[0] > 100, String(range));
   check("the calibration is used", /fake, with the rotation [-\d.,]+/.test(cameraYaml), cameraYaml.split("\n")[0]);
+  await testBrokenImage(page);
   await testAnchor(page);
   const zip = await testRecording(page);
   await page.locator("#stop").click();
@@ -98,6 +100,18 @@ async function testCalibration(page) {
   await becomes(page, "the hint says what to do", () => /steering wheel/.test(document.getElementById("hint").textContent));
   await screenshot(page, "calibrating");
   await becomes(page, "then the agent starts, without the ring", () => pangea.walk && !document.getElementById("ring").checkVisibility());
+}
+
+// One image that the browser cannot read must not stop the camera.
+async function testBrokenImage(page) {
+  await page.evaluate(() => {
+    const { createImageBitmap } = window;
+    window.createImageBitmap = async () => {
+      Object.assign(window, { createImageBitmap, imagesBefore: pangea.walk.numImages });
+      throw new Error("this image is broken");
+    };
+  });
+  await becomes(page, "a broken image is left out", () => pangea.walk.numImages > window.imagesBefore + 5);
 }
 
 async function testKeptCalibration(page) {
@@ -204,9 +218,93 @@ async function testRecording(page) {
   return zip;
 }
 
+// Keeps the streams of cameras; `whileOpening` is called while one is being opened. `asSafari`: images come as in Safari and Firefox.
+function watchCameras({ asSafari }) {
+  if (asSafari) delete window.MediaStreamTrackProcessor;
+  const devices = navigator.mediaDevices;
+  const open = devices.getUserMedia.bind(devices);
+  window.streams = [];
+  devices.getUserMedia = async (wanted) => {
+    const stream = await open(wanted);
+    window.streams.push(stream);
+    window.whileOpening?.();
+    return stream;
+  };
+  window.numCameras = () => window.streams.filter(({ active }) => active).length;
+  window.rotate = () => screen.orientation.dispatchEvent(new Event("change"));
+}
+
+// The agent of the walk is a new one, and it is the only one.
+async function hasOneNewAgent(page, what) {
+  await becomes(page, what, () => !pangea.walk?.isOld && pangea.walk?.vio?.counters.images > 2);
+  check("with one agent and one camera", page.workers().length === 1 && (await page.evaluate(() => numCameras())) === 1,
+    `${page.workers().length}, ${await page.evaluate(() => numCameras())}`);
+  await page.evaluate(() => (pangea.walk.isOld = true));
+}
+
+async function testInterruptions(browser, url) {
+  const page = await openPage(browser, url, kPhone, (page) => page.addInitScript(watchCameras, {}));
+  await senseMotion(page);
+  await page.locator("#start").click();
+  await hasOneNewAgent(page, "an agent to be interrupted starts");
+  await recordsUntil(page, "a rotated screen", () => page.evaluate(() => rotate()));
+  await hasOneNewAgent(page, "and starts anew");
+  await recordsUntil(page, "a failure", () => page.evaluate(() => pangea.walk.removeAnchor("breaks")));
+  await becomes(page, "and leads back", () => document.getElementById("welcome").checkVisibility());
+  await page.locator("#start").click();
+  await hasOneNewAgent(page, "one can start again");
+  await recordsUntil(page, "Stop", () => page.locator("#stop").click());
+
+  await page.locator("#start").click();
+  await hasOneNewAgent(page, "one can start after Stop");
+  await page.evaluate(() => (rotate(), rotate()));
+  await hasOneNewAgent(page, "a screen rotated there and back starts once");
+  await page.evaluate(() => {
+    window.whileOpening = () => document.getElementById("stop").click();
+    rotate();
+  });
+  await becomes(page, "Stop while the camera is opened leads back", () => document.getElementById("welcome").checkVisibility());
+  await page.waitForTimeout(1000);
+  check("and stays there, without camera and agent", page.workers().length === 0 &&
+    (await page.evaluate(() => numCameras() === 0 && document.getElementById("welcome").checkVisibility())));
+  await page.close();
+}
+
+// What ends a walk saves its recording.
+async function recordsUntil(page, what, end) {
+  await page.locator("#record").click();
+  await page.waitForFunction(() => pangea.walk.recorder?.numImages > 5);
+  const downloading = page.waitForEvent("download", { timeout: 10_000 }).catch(() => undefined);
+  await end();
+  check(`${what} saves the recording`, Boolean(await downloading));
+  check("and resets its button", (await page.locator("#record").textContent()) === "Record");
+}
+
+// The visitor taps Start twice, and the browser stores nothing and gives images as Safari does. The code of the invite works only once.
+async function testJoining(browser, url) {
+  const page = await openPage(browser, `${url}#join=ABCD-EFGH`, kPhone, (page) => page.addInitScript(watchCameras, { asSafari: true }));
+  const answers = [{ json: { agent: 2, key: "ab".repeat(32), site: "hall" } }];
+  await page.route("**/v1/join", (route) => route.fulfill(answers.pop() ?? { status: 403, json: { error: "used already" } }));
+  const noStorage = "indexedDB.open = () => { throw new Error('no storage'); };\n";
+  const body = noStorage + (await readFile(kFake, "utf8"));
+  await page.route("**/pangea_agent.mjs", (route) => route.fulfill({ contentType: "text/javascript", body }));
+  await senseMotion(page);
+  await page.evaluate(() => document.getElementById("join").requestSubmit());
+  check("Start cannot be tapped twice", await page.locator("#start").isDisabled());
+  await page.evaluate(() => document.getElementById("join").requestSubmit());
+  await page.locator("#skip").click();
+  await becomes(page, "without storage a member is told so", () => /does not keep what is unsent: .*no storage/.test(document.getElementById("notice").textContent));
+  await hasOneNewAgent(page, "and walks, with images as in Safari");
+  await testBrokenImage(page);
+  check("the code was used once", (await page.evaluate(() => pangea.walk.membership?.agent)) === 2);
+  await page.locator("#stop").click();
+  check("then one can start again", await page.locator("#start").isEnabled());
+  await page.close();
+}
+
 // A member can choose to upload the recording.
 async function testUpload(browser, url) {
-  const page = await openPage(browser, url, { viewport: { width: 360, height: 720 }, permissions: ["camera", "accelerometer", "gyroscope"] });
+  const page = await openPage(browser, url, kPhone);
   await page.evaluate((key) => localStorage.setItem("pangea.membership", JSON.stringify({ agent: 2, key, site: "hall", name: "Anna" })), "ab".repeat(32));
   await page.reload();
   await senseMotion(page);
@@ -252,7 +350,7 @@ async function testXr(browser, url) {
     }
     const lens = { picture, width: 960, height: 1280, projection };
     const half = Math.SQRT1_2;
-    window.xrSource = () => ({ ...lens, ...(!window.xrLost && { position: { x: 0, y: 1.5, z: 0 }, orientation: { x: 0, y: half, z: 0, w: half } }) });
+    window.xrSource = () => ({ ...lens, ...window.xrSize, ...(!window.xrLost && { position: { x: 0, y: 1.5, z: 0 }, orientation: { x: 0, y: half, z: 0, w: half } }) });
   }, projectionOf({ width: 960, height: 1280, focal: 1000 }));
   await page.locator("#start").click();
   await becomes(page, "WebXR: the device's images reach the agent", () => pangea.walk?.vio?.counters.images > 5);
@@ -270,9 +368,26 @@ async function testXr(browser, url) {
   await becomes(page, "the hint says when the device is lost", () => /^Lost/.test(document.getElementById("hint").textContent));
   await page.evaluate(() => (window.xrLost = false));
   await becomes(page, "and goes on when it is not", () => pangea.walk.pose.state === "tracking");
+  await testXrRotations(page);
   await page.locator("#stop").click();
   check("stopping ends the session", (await page.locator("#welcome").isVisible()) && (await page.evaluate(() => xrSession.ended)));
   await page.close();
+}
+
+// The screen is rotated there and back while the first agent ends, which takes a second here.
+async function testXrRotations(page) {
+  await page.evaluate(async () => {
+    const { postMessage } = Worker.prototype;
+    Worker.prototype.postMessage = function (message, transfer) {
+      setTimeout(() => postMessage.call(this, message, transfer), message.kind === "close" ? 1000 : 0);
+    };
+    pangea.walk.isOld = true;
+    window.xrSize = { width: 1280, height: 960 };
+    await new Promise((done) => setTimeout(done, 500));
+    window.xrSize = undefined;
+  });
+  await becomes(page, "a rotated screen starts anew", () => !pangea.walk.isOld && pangea.walk.vio?.counters.images > 5);
+  check("with one agent", page.workers().length === 1, page.workers().length);
 }
 
 async function testXrRefused(browser, url) {
@@ -295,6 +410,8 @@ await run(async () => {
   const url = await serve();
   const browser = await launch(["--use-fake-device-for-media-stream", "--use-fake-ui-for-media-stream"]);
   const zip = await testLive(browser, url);
+  await testInterruptions(browser, url);
+  await testJoining(browser, url);
   await testUpload(browser, url);
   await testPlaying(browser, url, zip);
   await testUncalibrated(browser, url, zip);

@@ -77,7 +77,7 @@ export class Camera {
       if (done) return;
       const utime = this.stopped ? undefined : clock.map(frame.timestamp, utimeOf(performance.now()));
       if (utime === undefined) frame.close();
-      else await this.give(utime, frame);
+      else await this.give(utime, () => frame);
     }
   }
 
@@ -89,15 +89,24 @@ export class Camera {
       const utime = utimeOf(captureTime ?? now);
       if (utime > newest) {
         newest = utime;
-        await this.give(utime, new VideoFrame(this.video));
+        await this.give(utime, () => new VideoFrame(this.video));
       }
       this.video.requestVideoFrameCallback(next);
     };
     this.video.requestVideoFrameCallback(next);
   }
 
+  // A frame that cannot be read is left out, because the next one may be good.
+  private async give(utime: number, open: () => VideoFrame) {
+    try {
+      await this.giveFrame(utime, open());
+    } catch (error) {
+      console.info(`An image of the camera was left out: ${error}`);
+    }
+  }
+
   // The frame is returned to the camera at once, because the camera has only few frames and stops when all are kept.
-  private async give(utime: number, frame: VideoFrame) {
+  private async giveFrame(utime: number, frame: VideoFrame) {
     const taken = Promise.all([lumaOfFrame(frame), createImageBitmap(frame)]);
     const [luma, picture] = await taken.finally(() => frame.close());
     if (this.onImage) this.onImage({ utime, picture, ...luma });

@@ -37,6 +37,7 @@ export class Panels {
     this.imagesBefore = this.rate_hz = 0;
     document.documentElement.classList.toggle("xr", usesXr);
     byId("hint").hidden = byId("bar").hidden = false;
+    this.showRecording();
     byId("record").hidden = !isLive || !walk || usesXr; // images without motion data are not a recording
     byId("skip").hidden = skipCalibration === undefined;
     if (usesXr && !walk) this.showHint({ text: "Move the phone slowly, so that AR finds its way.", tone: "do" });
@@ -46,6 +47,13 @@ export class Panels {
     document.documentElement.classList.remove("xr");
     showRing(undefined);
     byId("hint").hidden = byId("bar").hidden = true;
+  }
+
+  // What the button does next, and whether a recording runs.
+  showRecording() {
+    const isRecording = this.visit.walk?.recorder !== undefined;
+    byId("record").textContent = isRecording ? "Save" : "Record";
+    byId("record").classList.toggle("recording", isRecording);
   }
 
   drawMap(pose: AgentPose) {

@@ -9,6 +9,7 @@ const codeField = () => byId<HTMLInputElement>("code");
 
 export class Welcome {
   membership: Membership | undefined = storedMembership();
+  private joining?: Promise<void>;
 
   constructor() {
     byId("forget").onclick = () => {
@@ -23,16 +24,19 @@ export class Welcome {
     this.show();
   }
 
-  // Joins if an invite code was given.
+  // Joins if an invite code was given. Starts that overlap share one request, because the code works only once.
   async admit(): Promise<Membership | undefined> {
-    const code = codeField().value.trim();
-    if (code !== "") {
-      this.membership = await join(code, byId<HTMLInputElement>("name").value.trim());
-      // The code works only once, so a reloaded page must not offer it again.
-      history.replaceState(null, "", location.pathname);
-      codeField().value = "";
-    }
+    await (this.joining ??= this.joinByCode().finally(() => (this.joining = undefined)));
     return this.membership;
+  }
+
+  private async joinByCode() {
+    const code = codeField().value.trim();
+    if (code === "") return;
+    this.membership = await join(code, byId<HTMLInputElement>("name").value.trim());
+    // A reloaded page must not offer the code again.
+    history.replaceState(null, "", location.pathname);
+    codeField().value = "";
   }
 
   show() {
