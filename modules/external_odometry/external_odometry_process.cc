@@ -48,8 +48,10 @@ std::optional<Keyframe> ExternalOdometryProcess::AddImage(
   }
   last_image_utime_ = utime;
   node_.Count("frames");
-  Step now{utime, T_odom_body.value_or(Rigid3{}), Eigen::Vector3d::Zero()};
-  if (!T_odom_body) {
+  const bool has_pose =
+      T_odom_body && T_odom_body->t.allFinite() && T_odom_body->q.coeffs().allFinite();
+  Step now{utime, has_pose ? *T_odom_body : Rigid3{}, Eigen::Vector3d::Zero()};
+  if (!has_pose) {
     lost_ = true;
     Publish(now, /*tracking=*/false);
     return std::nullopt;

@@ -37,8 +37,8 @@ class ExternalOdometryProcess : public Process {
                           std::function<int64_t()> open_map, int64_t now_utime);
 
   // `image`: 8-bit grey; refused unless its `utime` is after that of the image before.
-  // `T_odom_body`: the z axis of odom points up; empty while the odometry is lost. Returns the
-  // keyframe if the image became one; it is already published.
+  // `T_odom_body`: the z axis of odom points up; empty, or not finite, while the odometry is lost.
+  // Returns the keyframe if the image became one; it is already published.
   std::optional<Keyframe> AddImage(int64_t utime, const cv::Mat& image,
                                    const std::optional<Rigid3>& T_odom_body);
   // The next pose begins a new map; its clock may start again.

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <vector>
 
 #include "core/testing/test_cameras.h"
@@ -121,6 +122,18 @@ TEST_F(ExternalOdometryTest, AnImageOfTheSameTimeIsRefused) {
   Walk(10);
   EXPECT_GT(ids_.size(), num_keyframes);
   EXPECT_NEAR(pose_.v_odom_body.x, 1, 1e-6);
+  EXPECT_EQ(Maps(), 1);
+}
+
+TEST_F(ExternalOdometryTest, APoseThatIsNotFiniteIsALoss) {
+  Walk(50);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  Add(Rigid3{Eigen::Quaterniond::Identity(), {nan, 0, 1.5}});
+  EXPECT_EQ(pose_.state, pose_t::STATE_LOST);
+  EXPECT_EQ(pose_.T_odom_body.translation.x, 0);
+  x_m_ += 0.1;
+  Walk(1);
+  EXPECT_EQ(pose_.state, pose_t::STATE_TRACKING);
   EXPECT_EQ(Maps(), 1);
 }
 

@@ -11,9 +11,18 @@ namespace pangea::vio {
 namespace {
 
 constexpr int64_t kMaxGap_us = 300'000;
-constexpr int64_t kMargin_us = 50'000;  // for changes of the estimated time offset
-constexpr size_t kMinKept = 100;        // for the stationary detector and the noise measurement
+constexpr int64_t kMaxSeen_us = 30'000;  // motion between samples that are closer is smooth
+constexpr int64_t kMargin_us = 50'000;   // for changes of the estimated time offset
+constexpr size_t kMinKept = 100;         // for the stationary detector and the noise measurement
 constexpr std::ptrdiff_t kNoiseSamples = 100;
+
+int64_t LongestStep(std::span<const ImuSample> samples) {
+  int64_t longest_us = 0;
+  for (size_t i = 0; i + 1 < samples.size(); ++i) {
+    longest_us = std::max(longest_us, samples[i + 1].utime - samples[i].utime);
+  }
+  return longest_us;
+}
 
 }  // namespace
 
@@ -58,7 +67,8 @@ ScaledPreintegration ImuBuffer::Integrate(int64_t from_utime, int64_t to_utime,
                          NoiseAround(from_utime, to_utime), intrinsics, gyro_bias, accel_bias);
 }
 
-// Measures the noise on the span, extended backwards to kNoiseSamples samples if it is shorter.
+// Measures the noise on the span, extended backwards to kNoiseSamples samples if it is shorter, and
+// allows for what a gap in it hides.
 ImuNoise ImuBuffer::NoiseAround(int64_t from_utime, int64_t to_utime) const {
   const auto before = [](int64_t utime) {
     return [utime](const ImuSample& sample) { return sample.utime <= utime; };
@@ -67,7 +77,13 @@ ImuNoise ImuBuffer::NoiseAround(int64_t from_utime, int64_t to_utime) const {
   const auto end = std::partition_point(samples_.begin(), samples_.end(), before(to_utime));
   const auto enough = end - std::min<std::ptrdiff_t>(kNoiseSamples, end - samples_.begin());
   const std::vector<ImuSample> around(std::min(begin, enough), end);
-  return MeasuredNoise(noise_, around);
+  const ImuNoise noise = MeasuredNoise(noise_, around);
+  const auto with_begin = begin == samples_.begin() ? begin : begin - 1;
+  const auto with_end = end == samples_.end() ? end : end + 1;
+  const int64_t step_us = LongestStep({with_begin, with_end});
+  return step_us <= kMaxSeen_us
+             ? noise
+             : WithUnseenMotion(noise, step_us, {std::min(begin, enough), with_end});
 }
 
 const ImuSample& ImuBuffer::At(int64_t utime) const {
@@ -89,6 +105,10 @@ BodyMotion ImuBuffer::MotionFrom(int64_t utime, double duration_s, const ImuIntr
     return Integrate(utime, until, intrinsics, state.gyro_bias, state.accel_bias).measured;
   };
   const Preintegration half = moved(utime + duration_us / 2), whole = moved(utime + duration_us);
+  if (half.duration_s <= 0 || whole.duration_s <= half.duration_s) {  // behind the newest sample
+    motion.omega = intrinsics.Corrected(At(utime)).gyro - state.gyro_bias;
+    return motion;
+  }
   // Fit t omega + t^2 / 2 alpha to both rotations.
   const Eigen::Vector3d slope_half = LogSo3(half.delta_q) / half.duration_s;
   const Eigen::Vector3d slope_whole = LogSo3(whole.delta_q) / whole.duration_s;

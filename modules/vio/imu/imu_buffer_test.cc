@@ -76,6 +76,18 @@ TEST(ImuBuffer, MotionOfAGlobalShutterIsTheRotationRate) {
   EXPECT_EQ(motion.a, Vector3d::Zero());
 }
 
+// The estimated time offset may ask for the motion behind the newest sample.
+TEST(ImuBuffer, MotionBehindTheNewestSampleIsItsRotationRate) {
+  constexpr int64_t kNewest_us = kFirst_us + 99 * 5'000;
+  const ImuBuffer buffer = Filled(100);
+  for (const int64_t behind_us : {0, 1, 20'000}) {
+    const BodyMotion motion = buffer.MotionFrom(kNewest_us + behind_us, 0.02, {}, ImuState{});
+    EXPECT_EQ(motion.omega, buffer.At(kNewest_us).gyro) << behind_us;
+    EXPECT_EQ(motion.alpha, Vector3d::Zero()) << behind_us;
+    EXPECT_EQ(motion.a, Vector3d::Zero()) << behind_us;
+  }
+}
+
 // Exact, as the axis of the rotation is constant.
 TEST(BodyMotion, BegunLaterItIsTheSame) {
   const Vector3d axis(0.6, -0.8, 0);

@@ -54,7 +54,42 @@ double Density(double given, double usual, std::span<const ImuSample> samples, C
   return std::clamp(given, white_share * shown, std::max(kMostShare * shown, usual));
 }
 
+// Largest mean square change, per axis, between samples that are at most `gap_us` apart, or next to
+// each other.
+double LargestChange(std::span<const ImuSample> samples, Channel of, int64_t gap_us) {
+  double largest = 0;
+  for (size_t lag = 1; lag < samples.size(); ++lag) {
+    double sum = 0;
+    int count = 0;
+    for (size_t i = 0; i + lag < samples.size(); ++i) {
+      if (lag == 1 || samples[i + lag].utime - samples[i].utime <= gap_us) {
+        sum += (samples[i + lag].*of - samples[i].*of).squaredNorm() / 3;
+        ++count;
+      }
+    }
+    if (count == 0) {
+      break;
+    }
+    largest = std::max(largest, sum / count);
+  }
+  return largest;
+}
+
 }  // namespace
+
+ImuNoise WithUnseenMotion(const ImuNoise& given, int64_t gap_us,
+                          std::span<const ImuSample> samples) {
+  // Variance of a mean rate over the gap to a density; the mean is off by half of the changes.
+  const double share_s = 0.25 * 1e-6 * static_cast<double>(gap_us);
+  ImuNoise noise = given;
+  noise.gyro_noise_density =
+      std::hypot(given.gyro_noise_density,
+                 std::sqrt(share_s * LargestChange(samples, &ImuSample::gyro, gap_us)));
+  noise.accel_noise_density =
+      std::hypot(given.accel_noise_density,
+                 std::sqrt(share_s * LargestChange(samples, &ImuSample::accel, gap_us)));
+  return noise;
+}
 
 ImuNoise WithUsualWalks(ImuNoise given) {
   given.gyro_random_walk = std::clamp(given.gyro_random_walk, kLeastGyroWalk, kMostGyroWalk);

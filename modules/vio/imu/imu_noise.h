@@ -19,6 +19,13 @@ namespace pangea::vio {
 // of the measured one.
 ImuNoise MeasuredNoise(const ImuNoise& given, std::span<const ImuSample> samples);
 
+// Allows for the motion that a gap of `gap_us` in the samples hides, which is integrated as the
+// mean of the samples at its ends. `samples`: those before the gap, and the one behind it. How much
+// they change within such a time says how far that mean may be off; as white noise over the gap it
+// is added to the densities.
+ImuNoise WithUnseenMotion(const ImuNoise& given, int64_t gap_us,
+                          std::span<const ImuSample> samples);
+
 // Returns `given` with its random walks limited to the range of IMUs in phones and cameras.
 ImuNoise WithUsualWalks(ImuNoise given);
 

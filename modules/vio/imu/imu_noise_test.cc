@@ -76,6 +76,27 @@ TEST(MeasuredNoise, OfExactOrFewSamplesIsWhatIsUsual) {
   EXPECT_EQ(MeasuredNoise(ImuNoise{}, {}).accel_noise_density, ImuNoise{}.accel_noise_density);
 }
 
+TEST(WithUnseenMotion, IsWhatTheSamplesChangeInSuchATime) {
+  const ImuNoise given = Given(3e-4, 2e-2);
+  // The largest change of the sine, on one axis of three: from crest to trough, in 125 ms.
+  const ImuNoise noise = WithUnseenMotion(given, 200'000, Shaken({}));
+  EXPECT_NEAR(noise.gyro_noise_density, std::sqrt(0.25 * 0.2 * 2 / 3), 0.01);
+  EXPECT_NEAR(noise.accel_noise_density, 3 * std::sqrt(0.25 * 0.2 * 2 / 3), 0.03);
+  const ImuNoise shorter = WithUnseenMotion(given, 40'000, Shaken({}));
+  EXPECT_LT(shorter.gyro_noise_density, 0.3 * noise.gyro_noise_density);
+}
+
+TEST(WithUnseenMotion, OfAStillHandIsNone) {
+  std::vector<ImuSample> still = Shaken({});
+  for (ImuSample& sample : still) {
+    sample.gyro = {0.1, 0, 0};
+    sample.accel = {0, 0, kGravity};
+  }
+  const ImuNoise noise = WithUnseenMotion(Given(3e-4, 2e-2), 200'000, still);
+  EXPECT_DOUBLE_EQ(noise.gyro_noise_density, 3e-4);
+  EXPECT_DOUBLE_EQ(noise.accel_noise_density, 2e-2);
+}
+
 TEST(WithUsualWalks, BoundsThem) {
   ImuNoise given;
   given.gyro_random_walk = 2.6e-6;

@@ -312,9 +312,9 @@ void Estimator::Impl::MarginaliseLandmarks(int frame) {
 }
 
 std::optional<std::string> Estimator::Impl::Implausible() const {
-  const ImuState& imu = problem.state.frames.back().imu;
-  if (!imu.T_odom_body.t.allFinite() || !imu.v_odom_body.allFinite() ||
-      !imu.T_odom_body.q.coeffs().allFinite()) {
+  const WindowFrame& newest = problem.state.frames.back();
+  const ImuState& imu = newest.imu;
+  if (!IsFinite(newest)) {
     return "the estimate is not finite";
   }
   if (imu.v_odom_body.norm() > kMaxSpeed) {
@@ -323,7 +323,7 @@ std::optional<std::string> Estimator::Impl::Implausible() const {
   if (imu.gyro_bias.norm() > kMaxGyroBias || imu.accel_bias.norm() > kMaxAccelBias) {
     return "the estimated biases are implausible";
   }
-  const double blind_s = Seconds(problem.state.frames.back().utime - last_tracked);
+  const double blind_s = Seconds(newest.utime - last_tracked);
   if (blind_s > kMaxBlind_s) {
     return fmt::format("nothing trackable for {:.1f} s", blind_s);
   }

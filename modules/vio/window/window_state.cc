@@ -6,6 +6,13 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
+bool IsFinite(const WindowFrame& frame) {
+  const ImuState& imu = frame.imu;
+  return imu.T_odom_body.t.allFinite() && imu.T_odom_body.q.coeffs().allFinite() &&
+         imu.v_odom_body.allFinite() && imu.gyro_bias.allFinite() && imu.accel_bias.allFinite() &&
+         frame.omega_body.allFinite() && frame.alpha_body.allFinite() && frame.a_body.allFinite();
+}
+
 int WindowState::Offset(int frame) const {
   int offset = kSharedSize;
   for (int i = 0; i < frame; ++i) {

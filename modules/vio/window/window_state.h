@@ -65,6 +65,9 @@ struct WindowFrame {
   int size() const { return pose_only ? kPoseSize : kFrameSize + (has_stamp_error() ? 1 : 0); }
 };
 
+// Whether the state and the motion during the read-out are numbers.
+bool IsFinite(const WindowFrame& frame);
+
 struct WindowState {
   Rigid3 T_body_cam;
   double time_offset_s = 0;  // t_imu = t_image + time_offset_s
