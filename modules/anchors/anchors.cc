@@ -131,16 +131,17 @@ Anchors::InGroup Anchors::Position(const AnchorPlacement& placement) const {
   for (const Hold& hold : placement.holds) {
     poses.push_back(T_map_body(placement.map, hold.seq) * hold.T_body_anchor);
     mean.T_map_anchor.t += hold.weight * poses.back().t;
+    mean.T_map_anchor.q = poses.front().q;
   }
   // Average the rotations in the tangent space of the first one; they are nearly equal.
   Eigen::Vector3d rotation = Eigen::Vector3d::Zero();
   Matrix6d spread = Matrix6d::Zero();
   for (size_t i = 0; i < poses.size(); ++i) {
-    rotation += placement.holds[i].weight * LogSo3(poses[i].q * poses[0].q.conjugate());
+    rotation += placement.holds[i].weight * LogSo3(poses[i].q * mean.T_map_anchor.q.conjugate());
     const Eigen::Vector3d off = poses[i].t - mean.T_map_anchor.t;
     spread.topLeftCorner<3, 3>() += placement.holds[i].weight * off * off.transpose();
   }
-  mean.T_map_anchor.q = (ExpSo3(rotation) * poses[0].q).normalized();
+  mean.T_map_anchor.q = (ExpSo3(rotation) * mean.T_map_anchor.q).normalized();
   mean.covariance = Rotated(T_map_odom(placement.map).R(), placement.covariance) + spread;
   return mean;
 }

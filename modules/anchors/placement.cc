@@ -98,6 +98,7 @@ bool Sees(const TrackedKeyframe& keyframe, const Vector3d& p_odom) {
 
 // Chooses the keyframes that hold the anchor: those nearest in time that see it, or of all if none
 // does. The weight is the inverse variance of the odometry between the keyframe and the placement.
+// If no odometry leads to any of them, or none is near in time, the nearest keyframe holds it.
 AnchorPlacement HoldBy(const OdometryTrack& track, int64_t utime, const Pose& pose, int count) {
   std::vector<std::pair<int64_t, int32_t>> seeing, blind;  // (microseconds away, seq)
   for (const auto& [seq, keyframe] : track.keyframes()) {
@@ -106,31 +107,33 @@ AnchorPlacement HoldBy(const OdometryTrack& track, int64_t utime, const Pose& po
     }
   }
   std::vector<std::pair<int64_t, int32_t>>& chosen = seeing.empty() ? blind : seeing;
-  const int32_t nearest = track.Nearest(utime)->first;
-  if (chosen.empty()) {
-    chosen.emplace_back(0, nearest);
-  }
   std::ranges::sort(chosen);
   chosen.resize(std::min<size_t>(chosen.size(), count));
 
   AnchorPlacement placement;
-  placement.covariance = pose.covariance;
   double total = 0;
+  const auto hold_by = [&](int32_t seq, double weight) {
+    const Rigid3 T_body_odom = track.Find(seq)->T_odom_body.Inverse();
+    placement.holds.push_back({seq, T_body_odom * pose.T_odom_anchor, weight});
+    total += weight;
+  };
+  const int32_t nearest = track.Nearest(utime)->first;
   for (const auto& [away_us, seq] : chosen) {
     const auto [variance_m2, variance_rad2] = track.Drift(nearest, seq);
     const double lever_m = (pose.T_odom_anchor.t - track.Find(seq)->T_odom_body.t).norm();
     const double weight =
         1 / (kFloorSigma_m * kFloorSigma_m + variance_m2 + variance_rad2 * lever_m * lever_m);
-    if (weight > 0 || chosen.size() == 1) {
-      const Rigid3 T_body_odom = track.Find(seq)->T_odom_body.Inverse();
-      placement.holds.push_back({seq, T_body_odom * pose.T_odom_anchor, weight});
-      total += weight;
+    if (weight > 0) {  // not across a gap, where the variance is infinite (or NaN)
+      hold_by(seq, weight);
     }
   }
-  for (Hold& hold : placement.holds) {
-    hold.weight = total > 0 ? hold.weight / total : 1;
+  if (placement.holds.empty()) {
+    hold_by(nearest, 1);
   }
-  placement.covariance += Diagonal(kFloorSigma_m, kFloorSigma_rad);
+  for (Hold& hold : placement.holds) {
+    hold.weight /= total;
+  }
+  placement.covariance = pose.covariance + Diagonal(kFloorSigma_m, kFloorSigma_rad);
   return placement;
 }
 

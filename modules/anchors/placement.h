@@ -25,7 +25,7 @@ struct Hold {
 
 struct AnchorPlacement {
   MapId map;
-  std::vector<Hold> holds;
+  std::vector<Hold> holds;  // at least one
   // Of T_odom_anchor when it was placed: the editor's covariance, or that of the surface's depth,
   // plus a small floor. The odometry between the keyframes that hold it is not included.
   Matrix6d covariance = Matrix6d::Identity();

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <numbers>
 #include <vector>
 
 #include "core/testing/synthetic_world.h"
@@ -82,6 +83,30 @@ TEST_F(PlacementTest, TheKeyframesThatSeeItHoldIt) {
     const auto pixel = camera.Project(keyframe.T_odom_cam().Inverse() * p_odom);
     EXPECT_TRUE(pixel && camera.Contains(*pixel)) << "keyframe " << hold.seq;
   }
+}
+
+// The keyframes up to 10 look away, and no odometry leads to those that see the anchor: it belongs
+// to the keyframe that it was placed at.
+TEST_F(PlacementTest, NoKeyframeBeyondAGapHoldsIt) {
+  OdometryTrack track;
+  for (Keyframe keyframe : agent().keyframes) {
+    if (keyframe.id.seq <= 10) {
+      keyframe.T_odom_body.q = YawRotation(std::numbers::pi) * keyframe.T_odom_body.q;
+    } else if (keyframe.id.seq == 11) {
+      keyframe.edge.reset();
+    }
+    track.Add(keyframe);
+  }
+  const Keyframe& beyond = agent().keyframes[12];
+  const Eigen::Vector3d p_odom = beyond.T_odom_cam() * Eigen::Vector3d(0, 0, 3);
+  AnchorEdit edit = Edit(Placement::kKeyframe, 10);
+  edit.T_ref_anchor.t = track.Find(10)->T_odom_body.Inverse() * p_odom;
+  const auto result = Place(edit, track, 8);
+  const auto& placement = std::get<AnchorPlacement>(result);
+  ASSERT_EQ(placement.holds.size(), 1u);
+  EXPECT_EQ(placement.holds[0].seq, 10);
+  EXPECT_EQ(placement.holds[0].weight, 1);
+  EXPECT_LT((Positions(track, placement)[0] - p_odom).norm(), 1e-9);
 }
 
 // On corners with a map point: the anchor is at the world's point.
