@@ -42,6 +42,7 @@ bool PoseGraph::UseConstraint(const Constraint& constraint) {
   const Loop& loop = loops_.Add(MakeLoop(constraint, *from, *to, maps_));
   if (!loop.intra() && pairs_.Add(loop, maps_)) {
     groups_.Regroup(pairs_);
+    restored_ &= IsUsed(loop);  // a separation shows that the restored solution is wrong
   }
   if (IsUsed(loop)) {
     groups_.Of(from->map).solve.AddLoop(loop);
@@ -101,7 +102,11 @@ void PoseGraph::SolveRestored() {
   bool undone = false;
   for (auto& [oldest, group] : groups_.by_oldest()) {
     if (group.solve.NewMapsWait()) {
-      Optimizer().SolveJoined(&group);
+      if (Optimizer().HasJoined(group)) {
+        Optimizer().SolveJoined(&group);
+      } else {
+        Optimizer().Solve(&group, false);
+      }
       ++num_solves_;
       undone |= UndoMerges(group);
     }

@@ -114,7 +114,7 @@ class PoseGraph {
   ReceivedConstraints constraints_;
   GroupPublisher publisher_;
   int64_t num_solves_ = 0;
-  bool restored_ = false;  // from Restore to the first Update
+  bool restored_ = false;  // from Restore to the first Update, if no merge is lost until then
 };
 
 }  // namespace pangea

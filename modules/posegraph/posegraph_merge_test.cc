@@ -250,6 +250,73 @@ TEST(PoseGraph, GroupsThatAreOneAfterTheCheckpointKeepTheirShapes) {
   EXPECT_LT(JointAte(world, update.states[0]), 0.06);
 }
 
+// The checkpoint has a wrong merge of two maps. The rest of the journal separates them, and then
+// joins them otherwise; a third map joins the second one. Nothing of the wrong solution stays.
+TEST(PoseGraph, AWrongMergeOfTheCheckpointIsUndoneByTheRestOfTheJournal) {
+  const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(3, 100));
+  const MapId &first = world.agents[0].map, &second = world.agents[1].map;
+  std::vector<KeyframePair> wrong, later;
+  for (const KeyframePair& pair : PairsBetweenMaps(world)) {
+    const auto [older, newer] = std::minmax(pair.from.map, pair.to.map);
+    if (newer == second) {
+      wrong.push_back(pair);
+    } else if (older == second) {
+      later.push_back(pair);
+    }
+  }
+  const size_t stride = wrong.size() / 30;
+  PoseGraph before({});
+  AddKeyframes(world, &before);
+  for (size_t i = 0; i < 6; ++i) {
+    before.AddConstraint(Shifted(world, wrong[i * stride], Rigid3(YawRotation(0.4), {5, 3, 0})));
+  }
+  const std::vector<uint8_t> bytes = Saved(&before);
+  ASSERT_EQ(before.counters().groups, 2);
+  const auto update_with = [&](size_t num_right) {
+    PoseGraph restored({});
+    ByteRecordReader reader(bytes);
+    EXPECT_TRUE(restored.Restore(&reader));
+    for (size_t i = 6; i < 6 + num_right; ++i) {
+      restored.AddConstraint(Shifted(world, wrong[i * stride], {}));
+    }
+    for (size_t i = 0; i < later.size(); i += stride) {
+      restored.AddConstraint(Shifted(world, later[i], {}));
+    }
+    return restored.Update();
+  };
+  const PoseGraphUpdate separated = update_with(4);
+  ASSERT_EQ(separated.states.size(), 2u);
+  EXPECT_EQ(separated.states[0].maps, std::vector{first});
+  const auto of_second = std::ranges::find(separated.corrections, second, &Correction::map);
+  ASSERT_NE(of_second, separated.corrections.end());
+  EXPECT_EQ(of_second->group, second);
+  EXPECT_LT(of_second->T_map_odom.t.norm(), 0.1);
+  EXPECT_LT(JointAte(world, separated.states[1]), 0.1);
+  const PoseGraphUpdate joined = update_with(22);
+  ASSERT_EQ(joined.states.size(), 1u);
+  EXPECT_LT(JointAte(world, joined.states[0]), 0.1);
+}
+
+TEST(PoseGraph, TheFirstLoopsOfALoneMapCountAfterARestartToo) {
+  const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(1, 100));
+  PoseGraph graph({});
+  AddKeyframes(world, &graph);
+  const std::vector<uint8_t> bytes = Saved(&graph);
+  PoseGraph restored({});
+  ByteRecordReader reader(bytes);
+  ASSERT_TRUE(restored.Restore(&reader));
+  for (const Constraint& one : MakeConstraints(world, 60, 0)) {
+    graph.AddConstraint(one);
+    restored.AddConstraint(one);
+  }
+  graph.Update();
+  restored.Update();
+  const MapState here = graph.States().at(0), there = restored.States().at(0);
+  for (size_t i = 0; i < here.keyframes.size(); ++i) {
+    EXPECT_EQ(there.keyframes.at(i).T_map_body.t, here.keyframes[i].T_map_body.t);
+  }
+}
+
 // Three viewpoints agree within the minimum drift between maps, but not within the drift that this
 // odometry's loops show, until further loops show a larger drift.
 TEST(PoseGraph, AMergeThatTheSolveDoesNotCarryIsUndoneAndTriedAgainAtTheEnd) {

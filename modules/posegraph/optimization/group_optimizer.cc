@@ -52,11 +52,13 @@ void GroupOptimizer::Solve(GraphGroup* group, bool from_the_beginning) const {
   }
 }
 
+bool GroupOptimizer::HasJoined(const GraphGroup& group) const {
+  return maps_[group.oldest()].solved_with == group.oldest() && PartsOf(group, maps_).size() > 1;
+}
+
 bool GroupOptimizer::JoinsALargePart(const GraphGroup& group) const {
-  const GroupParts parts = PartsOf(group, maps_);
-  const std::set<int>& oldest = parts.at(maps_[group.oldest()].solved_with);
-  return parts.size() > 1 &&
-         maps_.NumKeyframes(oldest) > static_cast<size_t>(options_.local_keyframes);
+  return HasJoined(group) && maps_.NumKeyframes(PartsOf(group, maps_).at(group.oldest())) >
+                                 static_cast<size_t>(options_.local_keyframes);
 }
 
 void GroupOptimizer::SolveJoined(GraphGroup* group) const {

@@ -28,6 +28,8 @@ class GroupOptimizer {
   // and the other maps are placed beside it and solved. This is quick, so the agents get
   // corrections early; the slow solve of the large group from the beginning stays due.
   void SolveJoined(GraphGroup* group) const;
+  // Whether other maps have joined the oldest map's part, and that part is in its map frame.
+  bool HasJoined(const GraphGroup& group) const;
   bool JoinsALargePart(const GraphGroup& group) const;
 
  private:
