@@ -168,6 +168,12 @@ void GlobalBa::DropIfAbout(const MapId& map) {
   }
 }
 
+const MapState* GlobalBa::RefinementOf(const MapId& map) const {
+  const MapState* const state = states_.Find(map);
+  const auto known = state == nullptr ? refined_.end() : refined_.find(state->group);
+  return known == refined_.end() ? nullptr : &known->second.state;
+}
+
 GlobalBa::Basis GlobalBa::BasisOf(const MapState& state) {
   return {state.maps, state.keyframes.size(), state.num_constraints, state.num_switched_off};
 }
@@ -190,7 +196,7 @@ bool GlobalBa::IsLocal(const MapState& state, const MapPoses& poses) const {
   if (known == refined_.end()) {
     return false;
   }
-  const auto& [basis, adjusted, whole_keyframes, whole_is_due] = known->second;
+  const auto& [basis, refined, adjusted, whole_keyframes, whole_is_due] = known->second;
   const auto count = static_cast<double>(state.keyframes.size());
   return count > options_.local.keyframes && !whole_is_due &&
          count < options_.local.whole_growth * static_cast<double>(whole_keyframes) &&
@@ -316,7 +322,7 @@ MapState GlobalBa::Finish() {
   std::ranges::sort(refined.keyframes, {}, &KeyframePose::id);
   ++counters_.finished;
   counters_.finished_local += work->local ? 1 : 0;
-  return refined;
+  return known.state = std::move(refined);
 }
 
 }  // namespace pangea

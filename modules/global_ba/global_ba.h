@@ -81,6 +81,9 @@ class GlobalBa {
   // Does one piece of work, if there is any. Returns the refined state after the last piece.
   std::optional<MapState> Advance();
 
+  // The last refinement of the map's group; null if there is none in use.
+  const MapState* RefinementOf(const MapId& map) const;
+
   const Counters& counters() const { return counters_; }
   size_t num_keyframes() const { return store_.size(); }
   const RecordCounters& store_counters() const { return store_.counters(); }
@@ -97,6 +100,7 @@ class GlobalBa {
   };
   struct Refined {
     Basis basis;
+    MapState state;  // as returned by Advance
     AdjustedGroup adjusted;
     size_t whole_keyframes = 0;  // size of the group at its last whole adjustment
     bool whole_is_due = false;

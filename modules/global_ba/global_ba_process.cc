@@ -43,6 +43,8 @@ GlobalBaProcess::GlobalBaProcess(Bus& bus, const GlobalBaOptions& options,
                records_) {
   node_.Listen<map_state_t>(channels::kMapState,
                             std::bind_front(&GlobalBaProcess::OnMapState, this));
+  node_.Listen<resend_request_t>(channels::kResendRequest,
+                                 std::bind_front(&GlobalBaProcess::OnResendRequest, this));
 }
 
 void GlobalBaProcess::Save(ByteWriter* writer) const {
@@ -67,11 +69,23 @@ void GlobalBaProcess::OnMapState(MapState state, const map_state_t& message) {
   }
 }
 
+void GlobalBaProcess::OnResendRequest(const ResendRequest& request) {
+  if (request.channel == channels::kMapState) {
+    if (const MapState* const refined = global_ba_.RefinementOf(request.range.map)) {
+      requested_.insert(refined->group);
+    }
+  }
+}
+
 void GlobalBaProcess::Advance() {
   if (const auto refined = global_ba_.Advance()) {
-    for (const map_state_t& chunk : ToMessages(*refined)) {
-      node_.Publish(std::string(channels::kRefinement), chunk);
-    }
+    Publish(*refined);
+  }
+}
+
+void GlobalBaProcess::Publish(const MapState& refined) {
+  for (const map_state_t& chunk : ToMessages(refined)) {
+    node_.Publish(std::string(channels::kRefinement), chunk);
   }
 }
 
@@ -86,6 +100,11 @@ void GlobalBaProcess::Tick(int64_t now_utime) {
   if (num_inputs_ != num_inputs_at_change_) {
     num_inputs_at_change_ = num_inputs_;
     last_input_utime_ = now_utime;
+  }
+  for (const MapId& group : std::exchange(requested_, {})) {
+    if (const MapState* const refined = global_ba_.RefinementOf(group)) {
+      Publish(*refined);
+    }
   }
   if (now_utime >= next_status_utime_) {
     next_status_utime_ = now_utime + kSecond;

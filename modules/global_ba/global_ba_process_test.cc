@@ -76,6 +76,30 @@ TEST(GlobalBaProcess, RefinesWhenItIsQuietAndOnlyOnce) {
   EXPECT_EQ(server.status.pending, 0);
 }
 
+TEST(GlobalBaProcess, WhoAsksForAStateGetsTheRefinementToo) {
+  const BaTestMessages messages = SmallWorld();
+  Server server;
+  server.SendAll(messages);
+  const auto ask = [&](const MapId& map) {
+    resend_request_t request{};
+    request.requester = "map_points";
+    request.channel = "MAP_STATE";
+    request.map = ToMessage(map);
+    PublishMessage(server.bus, "RESEND_REQUEST", request);
+    server.bus.Drain();
+  };
+  ask(messages.state.maps[1]);  // there is none yet
+  server.Tick(90);
+  ASSERT_EQ(server.refinements.size(), 1u);
+  for (const MapId& map : messages.state.maps) {
+    ask(map);
+  }
+  ask({77, 7});
+  server.Tick(1);
+  ASSERT_EQ(server.refinements.size(), 2u);  // once per group
+  EXPECT_EQ(EncodeMessage(server.refinements[1]), EncodeMessage(server.refinements[0]));
+}
+
 TEST(GlobalBaProcess, AMessagePutsItOff) {
   const BaTestMessages messages = SmallWorld();
   Server server;

@@ -36,9 +36,7 @@ void MapPoints::Take(const MapState& state) { groups_.Take(PosedGroup(state)); }
 
 void MapPoints::TakeRefined(const MapState& refined) {
   for (const KeyframePose& pose : refined.keyframes) {
-    if (store_.Contains(pose.id)) {
-      refined_.insert(pose.id);
-    }
+    refined_.insert(pose.id);
   }
 }
 

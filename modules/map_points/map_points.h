@@ -51,14 +51,15 @@ class MapPoints {
   static std::vector<uint8_t> RecordOf(const Keyframe& keyframe) {
     return SubmapStore::RecordOf(keyframe, kStore);
   }
-  // Saves only the keyframes. Restore returns false, and changes nothing, if the bytes are not
-  // those of a MapPoints.
+  // Saves only the keyframes: the journal has no states and refinements. Restore returns false, and
+  // changes nothing, if the bytes are not those of a MapPoints.
   void Save(ByteWriter* writer) const { store_.Save(writer); }
   bool Restore(ByteReader* reader) { return store_.Restore(reader); }
 
   void Take(Keyframe keyframe) { store_.Add(std::move(keyframe)); }
   // A complete state (not a chunk). For each map the state with the highest revision counts.
   void Take(const MapState& state);
+  // May come before the keyframes.
   void TakeRefined(const MapState& refined);
   // Empty if the group has no landmark that the agent might see and that was not sent recently.
   std::optional<MapLandmarks> Choose(const AgentPose& agent);

@@ -24,7 +24,7 @@ MapPointsProcess::MapPointsProcess(Bus& bus, const std::shared_ptr<RecordStore>&
     : node_(bus, "map_points"),
       records_(std::make_shared<JournalRecords>(records, MapPoints::RecordOf)),
       points_(records_),
-      journal_(node_, {},
+      journal_(node_, {.states = true},
                {.keyframe = [this](Keyframe keyframe) { points_.Take(std::move(keyframe)); }},
                {.place = checkpoint,
                 .format = kCheckpointFormat,
@@ -41,6 +41,9 @@ MapPointsProcess::MapPointsProcess(Bus& bus, const std::shared_ptr<RecordStore>&
 
 void MapPointsProcess::OnMapState(MapState state, const map_state_t& message) {
   if (auto whole = states_.Add(message.chunk, message.num_chunks, std::move(state))) {
+    if (!journal_.reading()) {  // else they are asked for all the same, to get the refinement
+      journal_.NoteStates(whole->maps);
+    }
     points_.Take(*whole);
   }
 }

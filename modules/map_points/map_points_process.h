@@ -2,6 +2,7 @@
 
 // In: KEYFRAME_*, MAP_STATE, REFINEMENT, POSE_*, HAVE. Out: LANDMARKS_k, STATUS_map_points.
 //
+// A process that starts late asks for the states of older maps; the answer includes refinements.
 // At most two messages per second, of up to 1200 bytes each, to each agent in a group: 2.4 kB/s.
 // Best effort: a lost landmark is sent again later if the agent still looks there.
 

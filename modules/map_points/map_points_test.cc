@@ -10,6 +10,8 @@
 #include "map_points/map_points_process.h"
 #include "messages/channels.h"
 #include "messages/messages.h"
+#include "pangea/have_t.hpp"
+#include "pangea/resend_request_t.hpp"
 
 namespace pangea {
 namespace {
@@ -144,6 +146,48 @@ TEST_F(MapPointsTest, OnlyAdjustedKeyframesOfTheGroupAreSources) {
   AgentPose rotated = PoseAt(0);
   rotated.T_map_body.q = YawRotation(3.14);
   EXPECT_FALSE(points.Choose(rotated));
+}
+
+// Started again on a finished map, it asks for the state; global_ba answers with the refinement.
+TEST_F(MapPointsTest, ProcessThatStartsLateAsksForTheStateOfAnOldMap) {
+  LocalBus bus;
+  MapPointsProcess process(bus);
+  std::vector<resend_request_t> requests;
+  bus.Subscribe(std::string(channels::kResendRequest), [&](const std::string&, Bytes data) {
+    resend_request_t request{};
+    ASSERT_TRUE(DecodeMessage(data, &request));
+    if (request.channel == channels::kMapState) {
+      requests.push_back(request);
+    }
+  });
+  have_t have{};
+  have.num_maps = 1;
+  have.maps.push_back(ToMessage(kOld));
+  have.highest_seq.push_back(39);
+  PublishMessage(bus, std::string(channels::kHave), have);
+  bus.Drain();
+  process.Tick(1'000'000);
+  bus.Drain();
+  ASSERT_EQ(requests.size(), 1u);
+  EXPECT_EQ(Parse(requests[0].map).value, kOld);
+  for (const map_state_t& chunk : ToMessages(state_)) {
+    PublishMessage(bus, std::string(channels::kMapState), chunk);
+  }
+  bus.Drain();
+  process.Tick(9'000'000);
+  bus.Drain();
+  EXPECT_EQ(requests.size(), 1u);
+}
+
+// A refinement may come before the journal's keyframes are read.
+TEST_F(MapPointsTest, ARefinementMayComeBeforeItsKeyframes) {
+  MapPoints points;
+  points.TakeRefined(state_);
+  for (const Keyframe& keyframe : keyframes_) {
+    points.Take(keyframe);
+  }
+  points.Take(state_);
+  EXPECT_TRUE(points.Choose(PoseAt(0)));
 }
 
 TEST_F(MapPointsTest, ProcessAnswersPosesAtMostTwiceASecond) {

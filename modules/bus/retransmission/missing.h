@@ -52,7 +52,7 @@ bool TakeRetransmission(Node& node, const again_t& again, const Handler& handler
   return is_one;
 }
 // Asks the pose graph to publish the MAP_STATE of the map's group again, and the corrections of its
-// maps. All processes get them.
+// maps, and global_ba its REFINEMENT. All processes get them.
 void AskForState(Node& node, const MapId& map);
 
 // Which messages of each map are missing, for a stream in which the order does not matter.
