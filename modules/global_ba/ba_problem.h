@@ -12,7 +12,8 @@
 // An odometry edge comes from the same samples and rays, and from many more images between the
 // keyframes: without it the adjustment would have less information on a map than its odometry. The
 // correlation of their errors is unknown, so the two are weighted by covariance intersection
-// (Julier and Uhlmann, 1997), which is consistent for any correlation. The edges of a map share an
+// (Julier and Uhlmann, 1997), which is consistent for any correlation. An edge without an inertial
+// measurement beside it has its full weight. The edges of a map share an
 // error of scale that their covariances do not contain: it is one unknown per map
 // (ScalePriorFactor), with the odometry's own sigma if the map is not metric.
 //

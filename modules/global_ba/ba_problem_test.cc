@@ -25,15 +25,12 @@ BaOptions ToTheEnd() {
   return options;
 }
 
-double PathLength(const BaWorld& world) {
-  double length = 0;
-  for (const BaKeyframe& keyframe : world.keyframes) {
-    if (keyframe.previous >= 0) {
-      length += (keyframe.imu.T_odom_body.t - world.keyframes[keyframe.previous].imu.T_odom_body.t)
-                    .norm();
-    }
+BaWorld WithoutBiases(BaWorld world) {
+  for (BaKeyframe& keyframe : world.keyframes) {
+    keyframe.imu.gyro_bias.setZero();
+    keyframe.imu.accel_bias.setZero();
   }
-  return length;
+  return world;
 }
 
 TEST(BaProblem, FindsExactTruth) {
@@ -126,6 +123,18 @@ TEST(BaProblem, ResidualsAreWhatTheyClaim) {
                3.0 * static_cast<double>(world.start.landmarks.size()) + 4;
   }
   EXPECT_NEAR(sum / degrees, 1, 0.05);
+}
+
+// The same for edges that have no IMU factor beside them: they have their full weight.
+TEST(BaProblem, EdgesAloneAreWhatTheyClaim) {
+  double sum = 0, degrees = 0;
+  for (uint64_t seed = 1; seed <= 5; ++seed) {
+    const BaWorld truth =
+        MakeBaTestWorld({.seed = seed, .landmarks = 0, .edge_sigma_m = 0.002, .imu = false}).truth;
+    sum += 2 * BaSolver(WithoutBiases(truth), BaOptions{}, RobustLoss{}).cost();
+    degrees += 6.0 * static_cast<double>(truth.keyframes.size() - 2);
+  }
+  EXPECT_NEAR(sum / degrees, 1, 0.1);
 }
 
 TEST(BaProblem, TheSameStartGivesTheSameBytes) {

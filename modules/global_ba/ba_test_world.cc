@@ -79,7 +79,9 @@ class Maker {
       keyframe.camera = agent;
       if (k > 0) {
         keyframe.previous = static_cast<int>(world_.keyframes.size()) - 2;
-        keyframe.preintegration = Integrate(flight, t - options_.step_s, &gyro_bias, &accel_bias);
+        if (options_.imu) {
+          keyframe.preintegration = Integrate(flight, t - options_.step_s, &gyro_bias, &accel_bias);
+        }
         keyframe.edge = Edge(flight.Pose(t - options_.step_s).Inverse() * flight.Pose(t));
       }
       keyframe.imu = {flight.Pose(t), flight.Velocity(t), gyro_bias, accel_bias};
@@ -185,9 +187,11 @@ BaTestMessages MessagesOf(const BaTestWorld& world) {
     keyframe.v_odom_body = start.imu.v_odom_body;
     if (start.previous >= 0) {
       const Rigid3& T_previous = world.start.keyframes[start.previous].imu.T_odom_body;
-      keyframe.edge = {start.id.seq - 1, T_previous.Inverse() * keyframe.T_odom_body,
-                       // The start's error between successive keyframes
-                       1e-3 * Matrix6d::Identity()};
+      const BaEdge of_start{T_previous.Inverse() * keyframe.T_odom_body,
+                            // The start's error between successive keyframes
+                            1e-3 * Matrix6d::Identity()};
+      const BaEdge edge = start.edge.value_or(of_start);
+      keyframe.edge = {start.id.seq - 1, edge.T_previous_this, edge.covariance};
       keyframe.preintegration = start.preintegration;
     } else {
       state.maps.push_back(start.id.map);
@@ -239,6 +243,17 @@ double WorstError(const BaWorld& world, const BaWorld& truth) {
     worst = std::max(worst, (p - (truth.keyframes[i].imu.T_odom_body.t - true_first.t)).norm());
   }
   return worst;
+}
+
+double PathLength(const BaWorld& world) {
+  double length = 0;
+  for (const BaKeyframe& keyframe : world.keyframes) {
+    if (keyframe.previous >= 0) {
+      length += (keyframe.imu.T_odom_body.t - world.keyframes[keyframe.previous].imu.T_odom_body.t)
+                    .norm();
+    }
+  }
+  return length;
 }
 
 }  // namespace pangea

@@ -25,6 +25,7 @@ struct BaTestOptions {
   double outlier_share = 0;     // share of rays to wrong points
   double edge_sigma_m = 0;      // of odometry edges, actual and stated (rad: a tenth); 0: no edges
   double edge_scale_error = 0;  // relative, of all edges
+  bool imu = true;              // false: keyframes without preintegration
   double noise = 1;             // 0: exact rays and samples
   double scale_error = 0.02;    // relative, of the initial values
   double start_sigma_m = 0.02;
@@ -37,9 +38,9 @@ struct BaTestWorld {
 
 BaTestWorld MakeBaTestWorld(const BaTestOptions& options);
 
-// The same world as messages of the server: keyframes whose odometry is the start, one match and
-// verification result between the k-th keyframes of two agents, and the group's state, which is
-// also the start.
+// The same world as messages of the server: keyframes whose odometry is the start, with the world's
+// edges if it has any, one match and verification result between the k-th keyframes of two agents,
+// and the group's state, which is also the start.
 struct BaTestMessages {
   std::vector<Keyframe> keyframes;
   std::vector<PlaceMatch> matches;
@@ -51,5 +52,8 @@ BaTestMessages MessagesOf(const BaTestWorld& world);
 // Largest position error of a keyframe, m, after alignment of the (unobservable) position and yaw
 // by the first keyframe's pose.
 double WorstError(const BaWorld& world, const BaWorld& truth);
+
+// Sum of the distances between successive keyframes of each map, m.
+double PathLength(const BaWorld& world);
 
 }  // namespace pangea

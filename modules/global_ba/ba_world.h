@@ -20,8 +20,8 @@ struct BaKeyframe {
   int64_t utime = 0;
   int camera = 0;  // index into BaWorld::cameras
   ImuState imu;    // "odom" is here the group's map frame
-  // Preintegration and odometry edge from keyframe `previous` of the world to this one; -1 and
-  // empty at the start of a map or of a part of it.
+  // Preintegration and odometry edge from keyframe `previous` of the world to this one; either may
+  // be missing. -1 and empty at the start of a map or of a part of it.
   int previous = -1;
   std::optional<Preintegration> preintegration;
   std::optional<BaEdge> edge;

@@ -55,6 +55,33 @@ TEST(GlobalBa, RefinesAGroup) {
   EXPECT_LT(WorstError(Moved(world.start, *refined), world.truth), 0.2 * before);
 }
 
+// An agent with its own odometry has no preintegrations. Its edges are metric; the start is not.
+TEST(GlobalBa, WithoutInertialMeasurementsTheEdgesGiveTheScale) {
+  for (const uint64_t seed : {1, 2, 3}) {
+    const BaTestWorld world =
+        MakeBaTestWorld({.seed = seed, .keyframes = 40, .edge_sigma_m = 0.002, .imu = false});
+    const double true_length = PathLength(world.truth);
+    ASSERT_NEAR(PathLength(world.start) / true_length, 1.02, 5e-3);
+    const auto refined = Server(MessagesOf(world)).Finish();
+    ASSERT_TRUE(refined.has_value());
+    const BaWorld moved = Moved(world.start, *refined);
+    EXPECT_NEAR(PathLength(moved) / true_length, 1, 2e-3);
+    EXPECT_LT(WorstError(moved, world.truth), 0.2 * WorstError(world.start, world.truth));
+  }
+}
+
+// Nothing but its edges says where a keyframe is that sees no landmark.
+TEST(GlobalBa, AKeyframeWithoutLandmarksMovesWithItsEdges) {
+  BaTestWorld world = MakeBaTestWorld({.edge_sigma_m = 0.002, .imu = false});
+  std::erase_if(world.start.observations, [&](const BaObservation& seen) {
+    return world.start.keyframes[seen.keyframe].id == KeyframeId{{2, 1000}, 10};
+  });
+  const auto refined = Server(MessagesOf(world)).Finish();
+  ASSERT_TRUE(refined.has_value());
+  EXPECT_LT(WorstError(Moved(world.start, *refined), world.truth),
+            0.2 * WorstError(world.start, world.truth));
+}
+
 // After an earlier adjustment, the initial poses differ, and so do the landmarks at first.
 TEST(GlobalBa, WhereItBeginsDoesNotMatter) {
   for (const uint64_t seed : {1, 2, 3}) {

@@ -61,7 +61,7 @@ class Maker {
     start.camera = static_cast<int>(world_.cameras.size()) - 1;
     scale_sigmas_.resize(world_.cameras.size());
     scale_sigmas_.back().push_back(keyframe.scale_sigma);
-    if (keyframe.edge && keyframe.preintegration) {
+    if (keyframe.edge) {
       const auto previous = index_.find({id.map, keyframe.edge->from_seq});
       if (previous != index_.end()) {
         start.previous = previous->second;

@@ -23,6 +23,7 @@ constexpr int kKeyframes = 6;
 struct Group {
   Group()
       : truth(MakeBaTestWorld({.keyframes = kKeyframes,
+                               .step_s = 0.51,  // so far apart that none is redundant
                                .landmarks = 40,
                                .noise = 0,
                                .scale_error = 0,
@@ -250,7 +251,17 @@ TEST(GroupWorld, EachMapHasItsLastCamera) {
   }
 }
 
-// A missing keyframe: the chain of preintegrations starts again after it.
+// A keyframe of an agent with its own odometry, or of a lift.
+TEST(GroupWorld, AnEdgeWithoutPreintegrationContinuesTheChain) {
+  Group group;
+  group.messages.keyframes[2].preintegration.reset();
+  const BaKeyframe keyframe = group.World().keyframes[2];
+  EXPECT_EQ(keyframe.previous, 1);
+  EXPECT_TRUE(keyframe.edge);
+  EXPECT_FALSE(keyframe.preintegration);
+}
+
+// A missing keyframe: the chain of edges starts again after it.
 TEST(GroupWorld, AMissingKeyframeBreaksTheChain) {
   Group group;
   group.messages.keyframes.erase(group.messages.keyframes.begin() + 2);

@@ -97,8 +97,7 @@ class Chooser {
   }
 
   // The keyframe, and its predecessors and successors as long as they see its landmarks; in both
-  // directions at least up to the next keyframe of the adjustment, to which inertial measurements
-  // connect it.
+  // directions at least up to the next keyframe of the adjustment, to which an edge connects it.
   const Shared& Along(const KeyframeId& id) {
     const auto [known, is_new] = along_.try_emplace(id);
     if (is_new) {

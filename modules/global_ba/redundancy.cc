@@ -70,9 +70,9 @@ class Culling {
     if (keyframe.previous < 0 || next_[i] < 0) {
       return false;
     }
-    const double gap_s =
-        keyframe.preintegration->duration_s + world_.keyframes[next_[i]].preintegration->duration_s;
-    return gap_s <= kMaxGap_s;
+    const int64_t gap_us =
+        world_.keyframes[next_[i]].utime - world_.keyframes[keyframe.previous].utime;
+    return 1e-6 * static_cast<double>(gap_us) <= kMaxGap_s;
   }
 
   bool IsSeenByOthers(int i) const {
@@ -98,12 +98,11 @@ class Culling {
   static void Bridge(const BaKeyframe& keyframe, BaKeyframe* over) {
     BaKeyframe& next = *over;
     next.previous = keyframe.previous;
-    if (keyframe.previous < 0) {
+    if (keyframe.preintegration && next.preintegration) {
+      next.preintegration = Compose(*keyframe.preintegration, *next.preintegration);
+    } else {
       next.preintegration.reset();
-      next.edge.reset();
-      return;
     }
-    next.preintegration = Compose(*keyframe.preintegration, *next.preintegration);
     if (keyframe.edge && next.edge) {
       next.edge = {keyframe.edge->T_previous_this * next.edge->T_previous_this,
                    ComposeCovariance(keyframe.edge->T_previous_this, keyframe.edge->covariance,

@@ -2,7 +2,7 @@
 
 // Removes redundant keyframes from an adjustment: those nearly all of whose landmarks are seen by
 // enough others (ORB-SLAM's rule: Mur-Artal et al., TRO 2015, section V.E). The preintegrations to
-// and from a removed keyframe are joined to one.
+// and from a removed keyframe are joined to one if both exist, and so are the edges.
 //
 // Never removed are the ends of a constraint, a map's first or last keyframe, and a keyframe
 // without which a span would be longer than kMaxGap_s: over more than a second the IMU constrains

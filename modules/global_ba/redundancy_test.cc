@@ -92,6 +92,32 @@ TEST(Redundancy, AMissingEdgeIsNotBridged) {
   EXPECT_GT(checked, 0);
 }
 
+TEST(Redundancy, AMissingPreintegrationIsNotBridged) {
+  BaWorld world = MakeBaTestWorld({.step_s = 0.2, .landmarks = 60, .edge_sigma_m = 0.01}).truth;
+  std::set<KeyframeId> without;
+  for (BaKeyframe& keyframe : world.keyframes) {
+    if (keyframe.id.seq % 5 == 0 || keyframe.id.map.agent_id == 2) {
+      keyframe.preintegration.reset();
+      without.insert(keyframe.id);
+    }
+  }
+  const BaWorld culled = WithoutRedundant(world, None(world));
+  EXPECT_LT(culled.keyframes.size(), 0.5 * static_cast<double>(world.keyframes.size()));
+  for (const BaKeyframe& keyframe : culled.keyframes) {
+    if (keyframe.previous < 0) {
+      continue;
+    }
+    const BaKeyframe& before = culled.keyframes[keyframe.previous];
+    bool complete = true;
+    for (KeyframeId id = keyframe.id; id.seq > before.id.seq; --id.seq) {
+      complete = complete && !without.contains(id);
+    }
+    EXPECT_EQ(keyframe.preintegration.has_value(), complete);
+    EXPECT_TRUE(keyframe.edge);
+    EXPECT_LE(1e-6 * static_cast<double>(keyframe.utime - before.utime), kMaxGap_s);
+  }
+}
+
 TEST(Redundancy, NeverWhatIsNeeded) {
   const BaWorld world = Dense();
   std::vector<Cull> cull = None(world);

@@ -77,21 +77,21 @@ class Reference {
   void AddFactors(int i) {
     const BaKeyframe& keyframe = world_->keyframes[i];
     const int previous = keyframe.previous;
-    if (previous < 0 || !keyframe.preintegration) {
+    const bool has_imu = keyframe.preintegration.has_value();
+    if (has_imu) {
+      problem_.AddResidualBlock(new PreintegrationFactor(*keyframe.preintegration, options_.imu),
+                                Weight(keyframe.edge ? 1 - kEdgeWeight : 1), Pose(previous),
+                                Motion(previous), Pose(i), Motion(i));
+    } else {
       problem_.AddResidualBlock(
           new BiasPriorFactor(options_.gyro_bias_sigma, options_.accel_bias_sigma), nullptr,
           Motion(i));
-      return;
     }
-    problem_.AddResidualBlock(new PreintegrationFactor(*keyframe.preintegration, options_.imu),
-                              Weight(keyframe.edge ? 1 - kEdgeWeight : 1), Pose(previous),
-                              Motion(previous), Pose(i), Motion(i));
     if (const auto& edge = keyframe.edge) {
-      const auto metres = keyframe.unknown_scale > 0 ? EdgeResidual::Metres::kOdometry
-                                                     : EdgeResidual::Metres::kWorld;
+      const auto metres = has_imu ? EdgeResidual::Metres::kWorld : EdgeResidual::Metres::kOdometry;
       problem_.AddResidualBlock(
           new EdgeFactor(EdgeResidual(edge->T_previous_this, edge->covariance, metres)),
-          Weight(kEdgeWeight), Pose(previous), Pose(i), &scales_[keyframe.camera]);
+          Weight(has_imu ? kEdgeWeight : 1), Pose(previous), Pose(i), &scales_[keyframe.camera]);
     }
   }
 

@@ -30,6 +30,9 @@ BaWorld HeldWorld(uint64_t seed, bool cameras_held) {
                       .start;
   for (BaKeyframe& keyframe : world.keyframes) {
     keyframe.held = keyframe.id.seq % 10 < 2;
+    if (keyframe.id.seq % 10 == 6) {
+      keyframe.preintegration.reset();
+    }
   }
   for (BaCamera& camera : world.cameras) {
     camera.held = cameras_held;

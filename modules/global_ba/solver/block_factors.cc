@@ -56,10 +56,13 @@ void BlockFactors::AddEdges(const BaWorld& world, const BaBlocks& blocks) {
   for (int i = 0; i < static_cast<int>(world.keyframes.size()); ++i) {
     const BaKeyframe& keyframe = world.keyframes[i];
     if (keyframe.previous >= 0 && keyframe.edge) {
-      const auto metres = keyframe.unknown_scale > 0 ? EdgeResidual::Metres::kOdometry
-                                                     : EdgeResidual::Metres::kWorld;
+      const bool has_imu = keyframe.preintegration.has_value();
+      // Without the IMU, edges may alone determine the scale (core/least_squares/edge_residual.h).
+      const auto metres = has_imu && keyframe.unknown_scale == 0 ? EdgeResidual::Metres::kWorld
+                                                                 : EdgeResidual::Metres::kOdometry;
       const BaEdge& edge = *keyframe.edge;
-      Add(new EdgeFactor(EdgeResidual(edge.T_previous_this, edge.covariance, metres)), kEdgeWeight,
+      Add(new EdgeFactor(EdgeResidual(edge.T_previous_this, edge.covariance, metres)),
+          has_imu ? kEdgeWeight : 1,
           {blocks.Pose(keyframe.previous), blocks.Pose(i), blocks.EdgeLogScale(keyframe.camera)});
     }
   }

@@ -19,6 +19,7 @@ namespace pangea {
 inline constexpr double kCameraPositionSigma_m = 0.005;
 inline constexpr double kCameraRotationSigma = 0.005;  // radians
 // Weight w of covariance intersection (ba_problem.h); the IMU factor parallel to an edge has 1 - w.
+// An edge without an IMU factor has weight 1.
 inline constexpr double kEdgeWeight = 0.5;
 // Relative sigma of the length of all edges of a metric map.
 inline constexpr double kEdgeScaleSigma = 0.01;
