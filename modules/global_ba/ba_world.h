@@ -32,6 +32,7 @@ struct BaKeyframe {
 // Variables shared by the keyframes of a map.
 struct BaCamera {
   Rigid3 T_body_cam;
+  Rigid3 T_body_cam_prior = T_body_cam;  // the odometry's estimate
   double edge_log_scale = 0;  // the map's edges are too long by the factor exp(edge_log_scale)
   bool held = false;          // fixed; else edge_log_scale starts at zero
 };

@@ -57,7 +57,7 @@ class Maker {
     // One camera per map, with the extrinsics of its last keyframe.
     const bool same_map = !world_.keyframes.empty() && world_.keyframes.back().id.map == id.map;
     world_.cameras.resize(world_.cameras.size() + (same_map ? 0 : 1));
-    world_.cameras.back().T_body_cam = keyframe.camera.T_body_cam;
+    world_.cameras.back() = {.T_body_cam = keyframe.camera.T_body_cam};
     start.camera = static_cast<int>(world_.cameras.size()) - 1;
     scale_sigmas_.resize(world_.cameras.size());
     scale_sigmas_.back().push_back(keyframe.scale_sigma);

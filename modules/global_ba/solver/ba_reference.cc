@@ -100,9 +100,9 @@ class Reference {
       const BaCamera& camera = world_->cameras[i];
       PoseToBlock(camera.T_body_cam, Camera(i));
       problem_.AddParameterBlock(Camera(i), 7, new RigidManifold);
-      problem_.AddResidualBlock(
-          new CameraPriorFactor(camera.T_body_cam, kCameraPositionSigma_m, kCameraRotationSigma),
-          nullptr, Camera(i));
+      problem_.AddResidualBlock(new CameraPriorFactor(camera.T_body_cam_prior,
+                                                      kCameraPositionSigma_m, kCameraRotationSigma),
+                                nullptr, Camera(i));
       problem_.AddResidualBlock(new ScalePriorFactor(kEdgeScaleSigma), nullptr, &scales_[i]);
       if (camera.held) {
         scales_[i] = camera.edge_log_scale;

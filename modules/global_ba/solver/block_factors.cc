@@ -75,7 +75,7 @@ void BlockFactors::AddPriors(const BaWorld& world, const BaBlocks& blocks) {
   }
   for (int i = 0; i < static_cast<int>(world.cameras.size()); ++i) {
     Add(new ScalePriorFactor(sigmas[i]), 1, {blocks.EdgeLogScale(i)});
-    Add(new CameraPriorFactor(world.cameras[i].T_body_cam, kCameraPositionSigma_m,
+    Add(new CameraPriorFactor(world.cameras[i].T_body_cam_prior, kCameraPositionSigma_m,
                               kCameraRotationSigma),
         1, {blocks.Camera(i)});
   }
