@@ -79,13 +79,14 @@ struct Estimator::Impl {
   // Returns the reason if the estimator has not started with this frame.
   std::optional<std::string> TryStart(const TrackedFrame& frame, std::span<const ImuSample> imu);
   // Returns the reason if the estimator is lost.
-  std::optional<std::string> Track(const TrackedFrame& frame,
-                                   std::vector<int32_t>* outlier_landmarks);
+  std::optional<std::string> Track(const TrackedFrame& frame, FrameResult* result);
+  // A gap in images or samples over which the window cannot be continued.
+  std::optional<std::string> GapBefore(const TrackedFrame& frame);
   void TellNewest(FrameResult* result);
   void Start(const InitialState& initial);
   ImuFactor MakeImuFactor(const WindowFrame& from, int64_t to_imu_utime) const;
   void Append(int64_t utime, const ImuState& imu, std::optional<ImuFactor> factor);
-  std::optional<std::string> AddToWindow(const TrackedFrame& frame);
+  void AddToWindow(const TrackedFrame& frame);
   void DropNonKeyframe();
   bool TracksGoOn(int64_t from_utime, int64_t to_utime) const;
   std::vector<int32_t> Solve(int max_iterations);
@@ -196,12 +197,7 @@ void Estimator::Impl::DropNonKeyframe() {
   }
 }
 
-// Returns the reason of a failure, nothing on success.
-std::optional<std::string> Estimator::Impl::AddToWindow(const TrackedFrame& frame) {
-  const int64_t imu_utime = ImuTime(frame.utime);
-  if (auto wrong = imu_samples.Gap(Newest().imu_utime, imu_utime)) {
-    return wrong;
-  }
+void Estimator::Impl::AddToWindow(const TrackedFrame& frame) {
   history.AddFrame(frame, camera, ray_sigma);
   const std::optional<double> shift =
       LastWindowKeyframe().stationary
@@ -211,11 +207,10 @@ std::optional<std::string> Estimator::Impl::AddToWindow(const TrackedFrame& fram
       stationary_detector.AddFrame(frame, shift, imu_samples, Newest().imu.gyro_bias);
   const bool is_tracked = TracksGoOn(Newest().utime, frame.utime);
   DropNonKeyframe();
-  const ImuFactor factor = MakeImuFactor(Newest(), imu_utime);
+  const ImuFactor factor = MakeImuFactor(Newest(), ImuTime(frame.utime));
   Append(frame.utime, Predict(factor.span.measured, Newest().imu), factor);
   Newest().stationary = stationary;
   Newest().is_tracked = is_tracked;
-  return std::nullopt;
 }
 
 bool Estimator::Impl::TracksGoOn(int64_t from_utime, int64_t to_utime) const {
@@ -345,20 +340,25 @@ std::optional<std::string> Estimator::Impl::TryStart(const TrackedFrame& frame,
   return std::nullopt;
 }
 
-std::optional<std::string> Estimator::Impl::Track(const TrackedFrame& frame,
-                                                  std::vector<int32_t>* outlier_landmarks) {
-  if (lost) {
-    return "lost before";
-  }
+std::optional<std::string> Estimator::Impl::GapBefore(const TrackedFrame& frame) {
   const double gap_s = Seconds(frame.utime - Newest().utime);
   if (gap_s > kMaxFrameGap_s) {
     return fmt::format("no images for {:.1f} s", gap_s);
   }
   excess_interval_s = stamps.excess_interval_s();
-  if (const auto wrong = AddToWindow(frame)) {
-    return wrong;
+  return imu_samples.Gap(Newest().imu_utime, ImuTime(frame.utime));
+}
+
+std::optional<std::string> Estimator::Impl::Track(const TrackedFrame& frame, FrameResult* result) {
+  if (lost) {
+    return "lost before";
   }
-  *outlier_landmarks = Solve(kMaxIterations);
+  if (auto gap = GapBefore(frame)) {
+    PublishUpTo(problem.state.Newest(), &result->finished);  // a gap does not spoil the window
+    return gap;
+  }
+  AddToWindow(frame);
+  result->outlier_landmarks = Solve(kMaxIterations);
   return std::nullopt;
 }
 
@@ -380,7 +380,7 @@ FrameResult Estimator::Impl::AddFrame(const TrackedFrame& frame, std::span<const
   stamps.AddImage(frame.utime);
   std::optional<std::string> wrong;
   if (started) {
-    wrong = Track(frame, &result.outlier_landmarks);
+    wrong = Track(frame, &result);
   } else if (const auto why_not = TryStart(frame, imu)) {
     result.reason = *why_not;
     return result;

@@ -147,9 +147,12 @@ TEST(Estimator, AGapInTheImagesIsALoss) {
     gap.frame = next.frame;
     gap.imu.insert(gap.imu.end(), next.imu.begin(), next.imu.end());
   }
+  const int64_t newest_utime = ride.tracked.back().utime;
   ride.Feed(gap);
   EXPECT_EQ(ride.last.state, EstimatorState::kLost);
   EXPECT_THAT(ride.last.reason, HasSubstr("no images"));
+  // The keyframes of the window are as good as before.
+  EXPECT_GT(ride.finished.back().utime, newest_utime - 1'000'000);
   ride.Advance(1);  // it stays lost
   EXPECT_EQ(ride.last.state, EstimatorState::kLost);
 }
