@@ -171,13 +171,24 @@ struct Choice {
   double next_cost = 0;  // cost of the best other rotation / cost of the best; 0: only one
 };
 
+// At low rates even the next image is further away than kSearchGap_s.
+std::vector<FramePair> SearchPairs(const Input& input, std::span<const FramePair> pairs,
+                                   int64_t origin) {
+  const double interval_s =
+      1e-6 * static_cast<double>(input.frames.back().utime - input.frames.front().utime) /
+      static_cast<double>(std::max<size_t>(1, input.frames.size() - 1));
+  const double gap_s = std::clamp(1.5 * interval_s, kSearchGap_s, kMaxGap_s);
+  const std::vector<FramePair> near = Pairs(input, gap_s, origin);
+  return WithMostMotion(near.empty() ? std::vector(pairs.begin(), pairs.end()) : near);
+}
+
 Choice ChooseRotation(const Input& input, std::span<const FramePair> pairs, int64_t origin) {
   const std::vector<Eigen::Quaterniond> rotations =
       input.q_body_cam ? std::vector{*input.q_body_cam} : AxisAlignedRotations();
   const std::vector<double> fields =
       input.field_of_view ? std::vector{*input.field_of_view}
                           : std::vector<double>(std::begin(kFieldsOfView), std::end(kFieldsOfView));
-  const std::vector<FramePair> searched = WithMostMotion(Pairs(input, kSearchGap_s, origin));
+  const std::vector<FramePair> searched = SearchPairs(input, pairs, origin);
   std::vector<Hypothesis> found =
       Search(searched, input.imu, origin, NominalCamera(input, CameraModel::Kind::kRadtan),
              rotations, fields);

@@ -52,6 +52,16 @@ TEST(Calibrate, IsAsFarOffAsItSays) {
   EXPECT_LT(largest[kTimeOffset], 0.001);
 }
 
+TEST(Calibrate, ImagesMayComeAtFiveHertz) {
+  TestWorldOptions options = Short(1);
+  options.seconds = 30;
+  options.image_hz = 5;
+  const TestWorld world = MakeTestWorld(options);
+  const Result result = Calibrate(world.input);
+  EXPECT_EQ(result.refused, "");
+  EXPECT_NEAR(result.parameters.Minus(world.truth)[kLogFocal], 0, 0.02);
+}
+
 // An error of a stamp shifts a whole image, so its residuals are not independent.
 TEST(Calibrate, StampsThatJitterMakeItLessSure) {
   TestWorldOptions options = Short(3);

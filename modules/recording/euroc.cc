@@ -99,17 +99,21 @@ void DropTornTail(std::vector<CsvRow>* rows, const std::string& path,
 
 // A recording lasts minutes or hours. A time stamp more than a day from its middle is an error, and
 // would be taken for the recording's beginning or end.
+bool IsFar(int64_t utime, int64_t middle_utime) {
+  constexpr int64_t kDay_us = 86'400'000'000;
+  return std::abs(utime - middle_utime) > kDay_us;
+}
+
 template <typename T>
 void DropFarStamps(std::vector<T>* items, const std::string& path,
                    std::vector<std::string>* warnings) {
-  constexpr int64_t kDay_us = 86'400'000'000;
   std::vector<int64_t> utimes;
   for (const T& item : *items) {
     utimes.push_back(item.utime);
   }
   const int64_t middle = Median(std::move(utimes));
-  const size_t far = std::erase_if(
-      *items, [middle](const T& item) { return std::abs(item.utime - middle) > kDay_us; });
+  const size_t far =
+      std::erase_if(*items, [middle](const T& item) { return IsFar(item.utime, middle); });
   if (far > 0) {
     warnings->push_back(
         fmt::format("{}: {} rows are stamped more than a day from the others; dropped", path, far));
@@ -351,18 +355,23 @@ cv::Mat EurocRecording::LoadImage(size_t index, std::string* why) const {
 }
 
 std::optional<int64_t> FirstImageUtimeOf(const std::string& folder) {
-  std::optional<int64_t> first;
+  std::vector<int64_t> utimes;
   try {
     for (const CsvRow& row : ReadCsv(FindMav0(folder) + "/cam0/data.csv")) {
       int64_t ns = 0;
       if (ParseNumber(row.fields[0], &ns)) {
-        first = std::min(first.value_or(UtimeFromNs(ns)), UtimeFromNs(ns));
+        utimes.push_back(UtimeFromNs(ns));
       }
     }
   } catch (const std::runtime_error&) {
     return std::nullopt;
   }
-  return first;
+  if (utimes.empty()) {
+    return std::nullopt;
+  }
+  const int64_t middle = Median(utimes);
+  std::erase_if(utimes, [middle](int64_t utime) { return IsFar(utime, middle); });
+  return *std::min_element(utimes.begin(), utimes.end());
 }
 
 Trajectory ReadEurocGroundTruthOf(const std::string& folder, std::vector<std::string>* warnings) {

@@ -150,6 +150,9 @@ double StampedRow(const YAML::Node& root, const std::string& file, const std::st
   Throw(file, fmt::format("'stamp_row: {}' is not known; known: first, middle, last", row));
 }
 
+// Kalibr's first IMU is the body.
+bool IsKalibrImu(const YAML::Node& root) { return !root["rate_hz"] && root["update_rate"]; }
+
 // The time offset of the first row. Kalibr fits one time to a whole image: that of its middle row.
 double TimeOffset(const YAML::Node& root, const std::string& file, double readout_s) {
   const bool is_ours = !root["timeshift_cam_imu"] || root["time_offset_s"];
@@ -266,7 +269,7 @@ EurocImuCalibration ParseEurocImuCalibration(const std::string& text,
                                              const std::string& sensor_yaml) {
   const YAML::Node root = LoadSensorFile(text, sensor_yaml, "imu0");
   EurocImuCalibration calibration;
-  const bool is_kalibr = !root["rate_hz"] && root["update_rate"];  // whose first IMU is the body
+  const bool is_kalibr = IsKalibrImu(root);
   if (!is_kalibr) {
     calibration.T_s_body = Transform(root, sensor_yaml, "T_BS");
   }
@@ -304,8 +307,8 @@ Rigid3 ReadEurocExtrinsics(const std::string& sensor_yaml) {
   if (!Exists(sensor_yaml)) {
     return {};
   }
-  const YAML::Node root = LoadSensorFile(ReadTextFile(sensor_yaml), sensor_yaml, "");
-  return root["T_BS"] ? Transform(root, sensor_yaml, "T_BS") : Rigid3();
+  const YAML::Node root = LoadSensorFile(ReadTextFile(sensor_yaml), sensor_yaml, "imu0");
+  return root["T_BS"] && !IsKalibrImu(root) ? Transform(root, sensor_yaml, "T_BS") : Rigid3();
 }
 
 }  // namespace pangea

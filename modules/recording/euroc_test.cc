@@ -130,6 +130,25 @@ TEST_F(EurocTest, BodyIsTheImuWhereverTheRigIs) {
   EXPECT_EQ(ReadEurocGroundTruthOf(root_, &warnings)[0].T.t, Eigen::Vector3d(2, 0, 3));
 }
 
+TEST_F(EurocTest, TheGroundTruthIsReadBesideKalibrsImuFileToo) {
+  Write("imu0/sensor.yaml",
+        "imu0:\n  accelerometer_noise_density: 0.002\n  accelerometer_random_walk: 0.003\n"
+        "  gyroscope_noise_density: 0.0002\n  gyroscope_random_walk: 2.2e-05\n"
+        "  update_rate: 200.0\n");
+  std::vector<std::string> warnings;
+  const Trajectory truth = ReadEurocGroundTruthOf(root_, &warnings);
+  ASSERT_FALSE(truth.empty());
+  EXPECT_EQ(truth[0].T.t, EurocRecording(root_).ground_truth()[0].T.t);
+}
+
+TEST_F(EurocTest, TheFirstImageIsNotAFarStamp) {
+  const std::string images = Text("cam0/data.csv");
+  const std::optional<int64_t> first = FirstImageUtimeOf(root_);
+  EXPECT_EQ(first, EurocRecording(root_).images().front().utime);
+  Write("cam0/data.csv", images + "0,0.png\n");
+  EXPECT_EQ(FirstImageUtimeOf(root_), first);
+}
+
 TEST_F(EurocTest, EquidistantOffsetAndReadout) {
   WriteCamera("equidistant", "32, 24");
   Write("cam0/sensor.yaml", Text("cam0/sensor.yaml") + "time_offset_s: -0.003\nreadout_s: 0.02\n");

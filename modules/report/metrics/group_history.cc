@@ -39,8 +39,12 @@ std::set<int32_t> GroupHistory::AgentsWith(const MapId& map) const {
 
 std::optional<int64_t> GroupHistory::TogetherSince(const MapId& map, int32_t agent) const {
   std::optional<int64_t> since;
+  std::map<MapId, size_t> group_of;
   for (size_t i = 0; i < session_.changes.size(); ++i) {
-    if (!Together(At(i + 1), map, agent)) {
+    for (const MapId& changed : session_.changes[i].maps) {
+      group_of[changed] = i;
+    }
+    if (!Together(group_of, map, agent)) {
       since.reset();
     } else if (!since) {
       since = session_.begin_utime + std::llround(1e6 * session_.changes[i].session_s);

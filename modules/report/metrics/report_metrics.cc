@@ -55,6 +55,10 @@ void ReadGroundTruth(const AgentRun& run, AgentMetrics* agent, std::vector<std::
                                       : agent->ground_truth.back().utime;
     std::erase_if(agent->ground_truth,
                   [&](const StampedPose& p) { return p.utime < *from || p.utime > to; });
+    if (agent->ground_truth.empty()) {
+      notes->push_back(fmt::format(
+          "agent {}: none of its ground truth is of the part played, so no error", run.id));
+    }
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <stdexcept>
 
 #include "bus/process.h"
@@ -49,8 +50,9 @@ std::vector<std::string> InputOf(const Player& player, const std::string& rate) 
                                        fmt::format("{}", script.start_s + before_s)});
   }
   if (script.duration_s > 0) {
-    arguments.insert(arguments.end(),
-                     {"--duration", fmt::format("{}", script.duration_s - before_s)});
+    // Killed after its last image, it has nothing left to play, and --duration is above 0.
+    const double rest_s = std::max(1e-3, script.duration_s - before_s);
+    arguments.insert(arguments.end(), {"--duration", fmt::format("{}", rest_s)});
   }
   return arguments;
 }
