@@ -85,9 +85,9 @@ async function testBrokenUpdate(page) {
     };
   });
   await seek(page, 0.2);
-  await becomes(page, "an update breaks the page: it connects anew, and goes on", () =>
-    Math.abs(pangea.model.now_s - 0.2 * pangea.model.start.end_s) < 0.3 && !Object.hasOwn(pangea.stage, "take") &&
-    document.getElementById("connection").textContent === "" && pangea.model.numKeyframes > 0);
+  await becomes(page, "an update breaks the page: it lets the connection go", () =>
+    document.getElementById("connection").textContent !== "");
+  await becomes(page, "and connects anew", () => document.getElementById("connection").textContent === "");
   await seek(page, 1);
   await becomes(page, "and gets the rest", () => pangea.model.numKeyframes === 63);
 }
