@@ -78,12 +78,17 @@ ImuNoise ImuBuffer::NoiseAround(int64_t from_utime, int64_t to_utime) const {
   const auto enough = end - std::min<std::ptrdiff_t>(kNoiseSamples, end - samples_.begin());
   const std::vector<ImuSample> around(std::min(begin, enough), end);
   const ImuNoise noise = MeasuredNoise(noise_, around);
-  const auto with_begin = begin == samples_.begin() ? begin : begin - 1;
-  const auto with_end = end == samples_.end() ? end : end + 1;
-  const int64_t step_us = LongestStep({with_begin, with_end});
+  // With the samples just before and behind the span.
+  const auto number = [this](auto sample) {
+    return static_cast<size_t>(sample - samples_.begin());
+  };
+  const auto up_to_end =
+      std::span<const ImuSample>(samples_).first(std::min(number(end) + 1, samples_.size()));
+  const size_t first = number(begin);
+  const int64_t step_us = LongestStep(up_to_end.subspan(first > 0 ? first - 1 : 0));
   return step_us <= kMaxSeen_us
              ? noise
-             : WithUnseenMotion(noise, step_us, {std::min(begin, enough), with_end});
+             : WithUnseenMotion(noise, step_us, up_to_end.subspan(number(std::min(begin, enough))));
 }
 
 const ImuSample& ImuBuffer::At(int64_t utime) const {
