@@ -84,7 +84,7 @@ void EditSpool::Put(const AnchorEdit& edit) {
   refuses_ = !Write(edit);
   if (!refuses_) {
     revisions_[edit.anchor] = edit.revision;
-    unsynced_.insert(edit.anchor);
+    folder_unsynced_ = true;
   }
 }
 
@@ -117,21 +117,13 @@ void EditSpool::Remove(const AnchorId& anchor, int64_t revision) {
     std::error_code error;
     fs::remove(File(anchor), error);
     revisions_.erase(kept);
-    unsynced_.erase(anchor);
   }
 }
 
 void EditSpool::Sync() {
-  for (const AnchorId& anchor : unsynced_) {
-    if (const int fd = open(File(anchor).c_str(), O_RDONLY | O_CLOEXEC); fd >= 0) {
-      fdatasync(fd);
-      close(fd);
-    }
-  }
-  if (!unsynced_.empty()) {
+  if (std::exchange(folder_unsynced_, false)) {
     SyncFolder(folder_);
   }
-  unsynced_.clear();
 }
 
 }  // namespace pangea

@@ -5,15 +5,14 @@
 //
 // There is one file for each anchor: an ordinary LCM log with its newest ANCHOR_REQUEST_k and the
 // checksum of that. A new file replaces the old one atomically, and is removed when the server has
-// answered. The page cache survives the death of the process; Sync makes the files survive a power
-// cut. A damaged file is reported on stderr and renamed. The caller bounds the number of edits. Not
-// thread safe.
+// answered. The page cache survives the death of the process. Put writes the file to the disk; Sync
+// makes its name survive a power cut. A damaged file is reported on stderr and renamed. The caller
+// bounds the number of edits. Not thread safe.
 
 #include <cstdint>
 #include <filesystem>
 #include <map>
 #include <optional>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -45,7 +44,7 @@ class EditSpool {
   const std::filesystem::path folder_;
   const std::string channel_;
   std::map<AnchorId, int64_t> revisions_;  // of the edits that are kept
-  std::set<AnchorId> unsynced_;
+  bool folder_unsynced_ = false;           // a file was renamed since the last Sync
   bool refuses_ = false;
 };
 

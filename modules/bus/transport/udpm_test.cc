@@ -97,6 +97,22 @@ TEST_F(UdpmTest, TheLinkTakesNoFragments) {
   EXPECT_EQ(bus.undelivered().by_kernel, 13 + 3 + 2) << "all fragments, and what is not LCM's";
 }
 
+// Publishes messages of 0, 1, ... bytes on A, slowly: the kernel keeps few.
+void Flood(LcmBus* bus, size_t count) {
+  for (size_t i = 0; i < count; ++i) {
+    bus->Publish("A", std::vector<uint8_t>(i));
+    if (i % 20 == 0) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+  }
+}
+
+void AwaitDrops(LcmBus* bus, int64_t count) {
+  for (int i = 0; i < 500 && bus->undelivered().no_room < count; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+}
+
 TEST_F(UdpmTest, WhatWaitsIsBoundedAndTheNewestIsDropped) {
   LcmBus bus(url);
   std::vector<size_t> sizes;
@@ -104,16 +120,9 @@ TEST_F(UdpmTest, WhatWaitsIsBoundedAndTheNewestIsDropped) {
   int others = 0;
   bus.Subscribe("B", [&](const std::string&, Bytes) { ++others; });
   constexpr size_t kSent = UdpmReceiver::kMaxWaiting + 300;
-  for (size_t i = 0; i < kSent; ++i) {
-    bus.Publish("A", std::vector<uint8_t>(i));
-    if (i % 20 == 0) {  // the kernel keeps few
-      std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    }
-  }
+  Flood(&bus, kSent);
   bus.Publish("B", {});
-  for (int i = 0; i < 500 && bus.undelivered().no_room < 300; ++i) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
+  AwaitDrops(&bus, 300);
   Heard(&bus);
   EXPECT_EQ(others, 1) << "one subscription's flood leaves room for another's";
   ASSERT_EQ(sizes.size(), UdpmReceiver::kMaxWaiting);
@@ -128,16 +137,9 @@ TEST_F(UdpmTest, AMessageThatOneOfTwoSubscriptionsMissesIsCounted) {
   int heard_b = 0;
   bus.Subscribe(".*B", [&](const std::string&, Bytes) { ++heard_b; });
   constexpr size_t kSent = UdpmReceiver::kMaxWaiting + 20;
-  for (size_t i = 0; i < kSent; ++i) {
-    bus.Publish("A", {});
-    if (i % 20 == 0) {  // the kernel keeps few
-      std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    }
-  }
+  Flood(&bus, kSent);
   bus.Publish("AB", {});
-  for (int i = 0; i < 500 && bus.undelivered().no_room < 21; ++i) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
+  AwaitDrops(&bus, 21);
   Heard(&bus);
   EXPECT_EQ(heard, static_cast<int>(UdpmReceiver::kMaxWaiting));
   EXPECT_EQ(heard_b, 1);
