@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "recording/euroc_test_recording.h"
+#include "recording/test_euroc_recording.h"
 
 namespace pangea {
 namespace {
