@@ -70,6 +70,23 @@ Rigid3 Upright(const Rigid3& T_odom_cam, const Vector3d& p_cam) {
   return {YawRotation(std::atan2(to_camera.y(), to_camera.x())), p_odom};
 }
 
+// From the first row of a rolling shutter, which the image's time and pose are of, to the pixel's.
+int64_t RowTime_us(const CameraModel& camera, const Vector2d& pixel) {
+  const double rows = std::max(camera.height - 1, 1);
+  return std::llround(1e6 * camera.readout_s * std::clamp(pixel.y() / rows, 0.0, 1.0));
+}
+
+// The body's pose at the edit's time or soon after it: the edit's own pose, moved on as the
+// odometry moved.
+std::optional<Rigid3> BodyAt(int64_t utime, const AnchorEdit& edit, const OdometryTrack& track) {
+  const auto then = track.Between(edit.utime), now = track.Between(utime);
+  if (!edit.T_odom_body) {
+    return then ? now : std::nullopt;
+  }
+  return utime != edit.utime && then && now ? *edit.T_odom_body * (then->Inverse() * *now)
+                                            : edit.T_odom_body;
+}
+
 std::optional<Pose> OnSurface(const AnchorEdit& edit, const OdometryTrack& track,
                               const Viewer& viewer) {
   const auto ray = viewer.camera.Unproject(edit.pixel);
@@ -161,17 +178,22 @@ PlacementResult Place(const AnchorEdit& edit, const OdometryTrack& track, int ho
     }
     return Held(edit, track, keyframe->utime, Relative(edit, keyframe->T_odom_body), holds);
   }
-  if (track.keyframes().empty() || track.keyframes().rbegin()->second.utime < edit.utime) {
+  if (track.keyframes().empty()) {
     return AwaitsKeyframe();
   }
-  const auto T_odom_body = edit.T_odom_body ? edit.T_odom_body : track.Between(edit.utime);
+  const bool on_surface = edit.placement == AnchorEdit::Placement::kPixel;
+  const CameraModel& camera = *track.Nearest(edit.utime)->second.camera;
+  const int64_t seen_utime = edit.utime + (on_surface ? RowTime_us(camera, edit.pixel) : 0);
+  if (track.keyframes().rbegin()->second.utime < seen_utime) {
+    return AwaitsKeyframe();
+  }
+  const auto T_odom_body = BodyAt(seen_utime, edit, track);
   if (!T_odom_body) {
     return NotPlaced{"it is from before the map's first keyframe"};
   }
-  if (edit.placement == AnchorEdit::Placement::kBody) {
+  if (!on_surface) {
     return Held(edit, track, edit.utime, Relative(edit, *T_odom_body), holds);
   }
-  const CameraModel& camera = *track.Nearest(edit.utime)->second.camera;
   const auto pose = OnSurface(edit, track, {*T_odom_body * camera.T_body_cam, camera});
   if (!pose) {
     return NotPlaced{"the map has no surface behind this pixel"};

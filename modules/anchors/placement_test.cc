@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <numbers>
 #include <vector>
 
@@ -136,6 +137,34 @@ TEST_F(PlacementTest, OnTheSurfaceBehindAPixel) {
   std::ranges::sort(errors);
   // The depths have 3 % of noise, and boxes stand before the walls.
   EXPECT_LT(errors[errors.size() / 2], 0.03);
+}
+
+// The image's pose is that of its first row.
+TEST_F(PlacementTest, ThePixelOfARollingShutterIsSeenWhenItsRowIs) {
+  OdometryTrack track;
+  for (Keyframe keyframe : agent().keyframes) {
+    keyframe.camera.readout_s = 0.03;
+    track.Add(keyframe);
+  }
+  const Keyframe& keyframe = agent().keyframes[12];
+  const CameraModel& camera = keyframe.camera;
+  AnchorEdit edit = Edit(Placement::kPixel, 12);
+  int placed = 0;
+  for (size_t i = 0; i < keyframe.points.size(); ++i) {
+    edit.T_odom_body = i % 2 == 0 ? track.Between(edit.utime) : std::nullopt;
+    edit.pixel = keyframe.corners[keyframe.points[i].corner].pixel.cast<double>();
+    const auto result = Place(edit, track, 1);
+    if (const auto* const placement = std::get_if<AnchorPlacement>(&result)) {
+      ++placed;
+      const double row_us = 30'000 * edit.pixel.y() / (camera.height - 1);
+      const Rigid3 T_odom_cam =
+          *track.Between(edit.utime + std::llround(row_us)) * camera.T_body_cam;
+      const auto pixel = camera.Project(T_odom_cam.Inverse() * Positions(track, *placement)[0]);
+      ASSERT_TRUE(pixel);
+      EXPECT_LT((*pixel - edit.pixel).norm(), 1e-3);
+    }
+  }
+  EXPECT_GT(placed, 5);
 }
 
 TEST_F(PlacementTest, OnASurfaceItStandsUprightAndFacesTheViewer) {

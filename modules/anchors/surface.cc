@@ -1,57 +1,98 @@
 #include "anchors/surface.h"
 
-#include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
 namespace pangea {
 namespace {
 
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
 constexpr size_t kMinPoints = 3;
 constexpr size_t kMaxPoints = 12;
 constexpr double kMaxDistance = 0.25;  // between rays, on z = 1: about 14 degrees
-// A surface is not a plane: the weight of a point decreases with its distance from the ray.
-// relative sigma of the inverse depth, per unit of distance between the rays
-constexpr double kRelativeBend = 0.3;
-// Prior sigma of the relative slope, for points that do not surround the ray.
-constexpr double kRelativeSlope = 1.0;
-constexpr double kHuber = 1.5;  // standard deviations
-constexpr int kIterations = 10;
-constexpr double kMaxRelativeSigma = 0.1;
+// The variogram: the relative inverse depths of two rays differ by kRoughness * d^(kExponent / 2),
+// one sigma, at a distance d. An exponent of 2 is a smooth surface, 1 one with steps everywhere.
+constexpr double kRoughness = 0.8;
+constexpr double kExponent = 1.5;
+// How many points kRoughness counts for, against the roughness that the points themselves show.
+constexpr double kPriorPoints = 8;
+constexpr double kOutlier = 2;  // standard deviations
+constexpr int kIterations = 2;
+constexpr double kMostSquares = 16;  // that a single point says of the roughness
+constexpr double kLeastRelativeSigma = 1e-6;
+constexpr double kMaxRelativeSigma = 0.15;
 
-struct Fit {
-  double inverse_depth = 0;
-  double sigma = 0;
+struct Kriging {
+  VectorXd inverse_depth;
+  VectorXd variance;      // of each inverse depth
+  VectorXd distance;      // to the ray
+  VectorXd semivariance;  // to the ray
+  MatrixXd semivariances;
 };
 
-Fit FitPlane(const Eigen::Vector2d& ray, const std::vector<SurfacePoint>& points) {
-  double scale = 0;
-  for (const SurfacePoint& point : points) {
-    scale += point.inverse_depth / static_cast<double>(points.size());
-  }
-  Eigen::Vector3d x(scale, 0, 0);  // inverse depth at the ray, and its gradient
-  Eigen::Matrix3d information;
-  double squares = 0;
-  for (int i = 0; i < kIterations; ++i) {
-    const double slope_weight = 1 / std::pow(kRelativeSlope * scale, 2);
-    information = Eigen::Vector3d(0, slope_weight, slope_weight).asDiagonal();
-    Eigen::Vector3d right = Eigen::Vector3d::Zero();
-    squares = 0;
-    for (const SurfacePoint& point : points) {
-      const Eigen::Vector2d from_ray = point.ray - ray;
-      const Eigen::Vector3d row(1, from_ray.x(), from_ray.y());
-      const double sigma = std::hypot(point.sigma, kRelativeBend * scale * from_ray.norm());
-      const double residual = (point.inverse_depth - row.dot(x)) / sigma;
-      const double weight = std::min(1.0, kHuber / std::max(std::abs(residual), 1e-9));
-      information += weight / (sigma * sigma) * row * row.transpose();
-      right += weight / (sigma * sigma) * point.inverse_depth * row;
-      squares += weight * residual * residual;
+double Median(VectorXd values) {
+  const auto middle = values.begin() + values.size() / 2;
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+Kriging Prepare(const Eigen::Vector2d& ray, const std::vector<SurfacePoint>& points) {
+  const auto count = static_cast<Eigen::Index>(points.size());
+  Kriging kriging{VectorXd(count), VectorXd(count), VectorXd(count), {}, MatrixXd(count, count)};
+  for (Eigen::Index i = 0; i < count; ++i) {
+    kriging.inverse_depth[i] = points[static_cast<size_t>(i)].inverse_depth;
+    kriging.distance[i] = (points[static_cast<size_t>(i)].ray - ray).norm();
+    for (Eigen::Index j = 0; j < count; ++j) {
+      kriging.semivariances(i, j) =
+          (points[static_cast<size_t>(i)].ray - points[static_cast<size_t>(j)].ray).norm();
     }
-    x = information.llt().solve(right);
   }
-  const double variance = information.llt().solve(Eigen::Vector3d::UnitX()).x();
-  const double scatter = std::max(1.0, squares / static_cast<double>(points.size()));
-  return {x.x(), std::sqrt(variance * scatter)};
+  const double scale = Median(kriging.inverse_depth);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const double sigma =
+        std::max(points[static_cast<size_t>(i)].sigma, kLeastRelativeSigma * scale);
+    kriging.variance[i] = sigma * sigma;
+  }
+  const double half_square = 0.5 * std::pow(kRoughness * scale, 2);
+  kriging.semivariance = half_square * kriging.distance.array().pow(kExponent);
+  kriging.semivariances = half_square * kriging.semivariances.array().pow(kExponent);
+  return kriging;
+}
+
+// Inverse of the equations of ordinary kriging (Cressie, Statistics for Spatial Data, 1993, section
+// 3.2); the last row is the condition that the weights add up to 1.
+MatrixXd InverseOfEquations(const Kriging& kriging) {
+  const Eigen::Index count = kriging.variance.size();
+  MatrixXd equations = MatrixXd::Ones(count + 1, count + 1);
+  equations.topLeftCorner(count, count) = -kriging.semivariances;
+  equations.topLeftCorner(count, count).diagonal() += kriging.variance;
+  equations(count, count) = 0;
+  return equations.inverse();
+}
+
+// Each point is predicted from the others (Dubrule, Mathematical Geology 1983). What the residuals
+// show scales the roughness, with more weight near the ray; points far off get a larger variance.
+void LearnFromResiduals(const VectorXd& variance, Kriging* kriging) {
+  const Eigen::Index count = variance.size();
+  const MatrixXd inverse = InverseOfEquations(*kriging).topLeftCorner(count, count);
+  const Eigen::ArrayXd information = inverse.diagonal().array().max(1e-300);
+  const Eigen::ArrayXd residual = (inverse * kriging->inverse_depth).array() / information;
+  const Eigen::ArrayXd squares = residual.square() * information;
+  const Eigen::ArrayXd weight =
+      1 / (1 + kriging->distance.array() / std::max(kriging->distance.mean(), 1e-9));
+  const double mean = (weight * squares.min(kMostSquares)).sum() / weight.sum();
+  const double factor = (mean * static_cast<double>(count) + kPriorPoints) /
+                        (static_cast<double>(count) + kPriorPoints);
+  kriging->semivariance *= factor;
+  kriging->semivariances *= factor;
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const bool outlier = squares[i] > kOutlier * kOutlier;
+    kriging->variance[i] =
+        variance[i] + (outlier ? residual[i] * residual[i] / (kOutlier * kOutlier) : 0.0);
+  }
 }
 
 }  // namespace
@@ -65,11 +106,22 @@ std::optional<SurfaceDepth> DepthBehind(const Eigen::Vector2d& ray,
   }
   std::ranges::stable_sort(points, {}, distance);
   points.resize(std::min(points.size(), kMaxPoints));
-  const Fit fit = FitPlane(ray, points);
-  if (!(fit.inverse_depth > 0) || !(fit.sigma < kMaxRelativeSigma * fit.inverse_depth)) {
+  Kriging kriging = Prepare(ray, points);
+  const VectorXd variance = kriging.variance;
+  for (int i = 0; i < kIterations; ++i) {
+    LearnFromResiduals(variance, &kriging);
+  }
+  VectorXd right(variance.size() + 1);
+  right << -kriging.semivariance, 1;
+  const VectorXd weights = (InverseOfEquations(kriging) * right).head(variance.size());
+  const double inverse_depth = weights.dot(kriging.inverse_depth);
+  const double sigma = std::sqrt(std::max(
+      0.0, 2 * weights.dot(kriging.semivariance) - weights.dot(kriging.semivariances * weights) +
+               weights.dot(kriging.variance.cwiseProduct(weights))));
+  if (!(inverse_depth > 0) || !(sigma < kMaxRelativeSigma * inverse_depth)) {
     return std::nullopt;
   }
-  return SurfaceDepth{1 / fit.inverse_depth, fit.sigma / (fit.inverse_depth * fit.inverse_depth)};
+  return SurfaceDepth{1 / inverse_depth, sigma / (inverse_depth * inverse_depth)};
 }
 
 }  // namespace pangea

@@ -20,9 +20,9 @@ struct SurfaceDepth {
   double sigma_m = 0;
 };
 
-// The inverse depth of a plane is linear in the ray, so a plane is fitted robustly to the nearest
-// points, with a prior on its slope, which matters if they do not surround the ray. Empty if there
-// are too few points nearby, or if the relative sigma of the result is above 0.1.
+// Interpolates the inverse depths of the nearest points by robust kriging: points say less the
+// farther they are from the ray, and how rough the surface is follows from how well they predict
+// each other. Empty if there are too few points nearby, or if the relative sigma is above 0.15.
 std::optional<SurfaceDepth> DepthBehind(const Eigen::Vector2d& ray,
                                         std::vector<SurfacePoint> points);
 

@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 
 #include <cmath>
+#include <numbers>
 #include <random>
 
 namespace pangea {
@@ -46,6 +47,28 @@ TEST(Surface, ItsSigmaIsNotTooSmall) {
   }
   EXPECT_LT(squares / kTrials, 1.2);
   EXPECT_GT(squares / kTrials, 0.1);
+}
+
+// Boxes stand before a wall: what lies between two points is not known, and the sigma must say so.
+TEST(Surface, ItsSigmaCountsSteps) {
+  std::mt19937_64 random(7);
+  std::uniform_real_distribution<double> place(-0.2, 0.2), yaw(0, 2 * std::numbers::pi);
+  int placed = 0, beyond = 0;
+  for (int i = 0; i < 300; ++i) {
+    const double edge = place(random), angle = yaw(random);
+    const Eigen::Vector2d across(std::cos(angle), std::sin(angle));
+    auto points = PlanePoints({0, 0, 1}, 4, 40, 0.01, 1000 + i);
+    for (SurfacePoint& point : points) {
+      point.inverse_depth *= across.dot(point.ray) > edge ? 1.3 : 1;
+    }
+    if (const auto depth = DepthBehind({0, 0}, points)) {
+      ++placed;
+      const double truth = edge < 0 ? 4 / 1.3 : 4;
+      beyond += static_cast<int>(std::abs(depth->depth_m - truth) > 3 * depth->sigma_m);
+    }
+  }
+  EXPECT_GT(placed, 280);
+  EXPECT_LT(beyond, 0.05 * placed);
 }
 
 TEST(Surface, AFewWrongPointsDoNotMoveIt) {

@@ -11,6 +11,7 @@ export interface CameraModel {
   intrinsics: [number, number, number, number]; // fx fy cx cy, pixels
   distortion: [number, number, number, number]; // k1 k2 p1 p2, or k1 to k4
   T_body_cam: Matrix4;
+  readout_s: number; // from the first row to the last; 0: a global shutter
 }
 
 type Fields = Record<string, unknown>;
@@ -52,6 +53,7 @@ export function parseCamera(text: string, file: string, T_rig_body = new Matrix4
     intrinsics: numbers(fields, file, "intrinsics", 4) as CameraModel["intrinsics"],
     distortion: numbers(fields, file, "distortion_coefficients", 4) as CameraModel["distortion"],
     T_body_cam: T_rig_body.clone().invert().multiply(parseExtrinsics(text, file)),
+    readout_s: Number.isFinite(fields.readout_s) ? (fields.readout_s as number) : 0,
   };
 }
 

@@ -10,6 +10,7 @@ import type { AgentPose, Pose7 } from "../agent/phone_agent";
 import { kAnchorFaces } from "./anchor_shape";
 import { project } from "./camera_model";
 import type { CameraModel } from "./camera_model";
+import type { CameraMotion } from "./camera_motion";
 import type { Fit, Size } from "./fit";
 import { kFrustumEdges } from "./frustum";
 import { matrixOf } from "./poses";
@@ -38,16 +39,23 @@ interface Seen extends DrawnThing {
   T_cam_thing: Matrix4;
 }
 
-// The things whose origin is in front of the camera, nearest first, also those outside the image.
-export function thingsBefore(camera: CameraModel, pose: AgentPose, things: Thing[]): Seen[] {
+// The things whose origin is in front of the camera, nearest first, also those outside the image. Each is where the row that sees its
+// origin sees it, if the motion is known.
+export function thingsBefore(camera: CameraModel, pose: AgentPose, things: Thing[], motion?: CameraMotion): Seen[] {
   const T_cam_odom = matrixOf(pose.T_odom_body).multiply(camera.T_body_cam).invert();
   const seen = things.flatMap(({ T_odom_thing, ...thing }) => {
     const T_cam_thing = T_cam_odom.clone().multiply(matrixOf(T_odom_thing));
+    const inFirstRow = project(camera, new Vector3().setFromMatrixPosition(T_cam_thing));
+    if (motion && inFirstRow) T_cam_thing.premultiply(motion.after(secondsOfRow(camera, inFirstRow[1])));
     const p_cam = new Vector3().setFromMatrixPosition(T_cam_thing);
     const pixel = project(camera, p_cam);
     return pixel ? [{ ...thing, pixel, distance_m: p_cam.length(), T_cam_thing }] : [];
   });
   return seen.sort((a, b) => a.distance_m - b.distance_m).slice(0, kMaxThings);
+}
+
+function secondsOfRow({ readout_s, height }: CameraModel, row: number): number {
+  return (readout_s * Math.min(Math.max(row, 0), height - 1)) / (height - 1);
 }
 
 type Point = [number, number, number]; // screen pixels and depth

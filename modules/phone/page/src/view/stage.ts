@@ -4,6 +4,7 @@
 import type { WebGLRenderTarget } from "three";
 import type { AgentPose, OtherAgent, ShownAnchor } from "../agent/phone_agent";
 import type { CameraModel } from "./camera_model";
+import { CameraMotion } from "./camera_motion";
 import { Fit } from "./fit";
 import { Overlay, thingsBefore } from "./overlay";
 import type { DrawnThing } from "./overlay";
@@ -19,6 +20,7 @@ export interface Drawn {
 export class Stage {
   drawn?: Drawn;
   private readonly waiting = new Map<number, ImageBitmap>();
+  private before?: AgentPose;
   readonly overlay: Overlay;
 
   constructor(
@@ -42,20 +44,25 @@ export class Stage {
 
   // Shows the picture of the pose, if it is still there.
   show(camera: CameraModel, pose: AgentPose, anchors: ShownAnchor[], others: OtherAgent[]) {
-    if (this.present(pose.utime)) this.draw(camera, pose, anchors, others);
+    const motion = CameraMotion.between(this.before, pose, camera);
+    this.before = pose;
+    if (this.present(pose.utime)) this.draw(camera, pose, anchors, others, { motion });
   }
 
   // For a device that shows its camera's image itself: draws only the things, into `target`.
   showThrough(camera: CameraModel, pose: AgentPose, anchors: ShownAnchor[], others: OtherAgent[], target: WebGLRenderTarget) {
-    this.draw(camera, pose, anchors, others, target);
+    this.draw(camera, pose, anchors, others, { target });
   }
 
-  private draw(camera: CameraModel, pose: AgentPose, anchors: ShownAnchor[], others: OtherAgent[], target?: WebGLRenderTarget) {
+  private draw(
+    camera: CameraModel, pose: AgentPose, anchors: ShownAnchor[], others: OtherAgent[],
+    { motion, target }: { motion?: CameraMotion; target?: WebGLRenderTarget },
+  ) {
     const things = [
       ...anchors.map(({ id, name, owner, T_odom_anchor }) => ({ id, name, owner, T_odom_thing: T_odom_anchor })),
       ...others.map(({ agent, T_odom_cam }) => ({ name: this.nameOf(agent), owner: agent, T_odom_thing: T_odom_cam })),
     ];
-    const seen = pose.state === "tracking" ? thingsBefore(camera, pose, things) : [];
+    const seen = pose.state === "tracking" ? thingsBefore(camera, pose, things, motion) : [];
     this.overlay.draw(camera, this.onScreen(camera), seen, this.colourOf, target);
     const drawn = seen.map(({ T_cam_thing: _, ...thing }) => thing);
     this.drawn = {
