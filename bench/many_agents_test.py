@@ -25,10 +25,10 @@ class ManyAgentsTest(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.work = Path(folder.name)
 
-    def metrics(self, seqs_of_2, late_us):
+    def metrics(self, seqs_of_2, late_us, sent=range(10)):
         parts = []
         for id, seqs in ((1, range(10)), (2, seqs_of_2), (3, range(5))):
-            write_log(self.work / f"agent_{id}.lcm", id, range(10) if id < 3 else range(7))
+            write_log(self.work / f"agent_{id}.lcm", id, sent if id < 3 else range(7))
             parts.append(self.work / f"part_{id}.lcm")
             write_log(parts[-1], id, seqs, late_us=late_us)
         for name in ("server.lcm", "journal.lcm"):
@@ -47,6 +47,12 @@ class ManyAgentsTest(unittest.TestCase):
 
     def test_what_is_lost_of_an_agent_that_lives_is_missing(self):
         self.assertEqual(self.metrics(range(8), 30_000)["missing"], 2)
+
+    def test_agents_that_send_nothing_are_named(self):
+        self.assertEqual(self.metrics(range(10), 30_000)["silent"], [])
+        found = self.metrics(range(10), 30_000, sent=())
+        self.assertEqual((found["missing"], found["silent"]), (0, [1, 2]))
+        self.assertIn("No keyframe of the agents 1, 2 was sent", table(found))
 
     def test_a_copy_is_another_agents(self):
         write_log(self.work / "one.lcm", 1, range(3))

@@ -26,12 +26,13 @@ def metrics(run, options):
     during = [late[key] for key in others if begin <= sent[key][0] <= (end or 0)]
     calm = [late[key] for key in others if not begin <= sent[key][0] <= (end or 0)]
     missing = [key for key in sent if key[0] != run.killed and key not in journalled]
+    silent = set(run.ids) - {run.killed} - {key[0] for key in sent}
     full = [sample for sample in run.memory if sample[1] == options.agents]
     first, last = run.memory[0], (full or run.memory)[-1]
     keyframe_bytes = sum(size for _, _, size in journalled.values())
     return {
         "agents": options.agents, "keyframes_sent": len(sent), "keyframes_journalled": len(journalled),
-        "missing": len(missing), "keyframe_mb": round(1e-6 * keyframe_bytes, 1),
+        "missing": len(missing), "silent": sorted(silent), "keyframe_mb": round(1e-6 * keyframe_bytes, 1),
         "calm": spread(calm), "while_one_is_stopped_and_one_dead": spread(during),
         "stopped_agent": spread([late[key] for key in late if key[0] == run.stopped]),
         "handler_mb_first": round(1e-3 * first[2], 1), "handler_mb_all": round(1e-3 * last[2], 1),
@@ -55,4 +56,6 @@ def table(f):
              f"({f['missing']} missing of agents that were not killed), {f['keyframe_mb']} MB. Resident memory: handler "
              f"{f['handler_mb_first']} MB with the first agent, {f['handler_mb_all']} MB with all, {f['handler_mb_end']} MB at "
              f"the end; uplink {f['uplink_mb_median']} MB (largest {f['uplink_mb_max']}).")
+    if f["silent"]:
+        facts += f" No keyframe of the agents {', '.join(map(str, f['silent']))} was sent: see logs/player_*."
     return "\n".join(lines) + "\n\n" + facts + "\n"
