@@ -100,23 +100,32 @@ class TablesTest(unittest.TestCase):
         self.assertEqual(self.row(NEVER, constraints=3).missed(), ["3 constraints"])
         self.assertEqual(self.row(NEVER, constraints=0, apart=True, joint=[None, None]).missed(), [])
 
-    def test_a_row_from_reports(self):
+    def tables(self, session, of_order):
+        """`of_order`: constraints between the recordings, and wrong ones, by the end of the server job's name."""
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
-        options = argparse.Namespace(bin=".", work=folder.name, groundtruth=None, sessions=["bare_walk+bare_phone"], seconds=None, only=[])
+        options = argparse.Namespace(bin=".", work=folder.name, groundtruth=None, sessions=[session], seconds=None, only=[])
         plan = Plan(options)
         plan.make()
         for (_, name), (job, agents) in plan.servers.items():
-            constraints = {"checked": 12, "wrong": 0, "nees_per_dim": {"mean": 1.5}} if "+" in name else None
+            checked, wrong = of_order.get(name.removeprefix(session), (0, 0)) if "+" in name else (0, 0)
+            constraints = {"checked": checked, "wrong": 0, "nees_per_dim": {"mean": 1.5}} if checked else None
             report = {"agents": [{"id": a.id, "ate_vio_m": 0.03, "ate_server_m": 0.01, "coverage": 1, "map_ids": [1]} for a in agents],
                       "groups": [{"agents": sorted(a.id for a in agents), "ate_joint_m": 0.02}],
-                      "constraints_truth": {"wrong": 1, "inter": constraints, "intra": None}}
+                      "constraints_truth": {"wrong": wrong, "inter": constraints, "intra": None}}
             job.folder.mkdir(parents=True)
             (job.folder / "report.json").write_text(json.dumps(report))
             job.state = "kept"
-        tables = Tables(plan)
+        return Tables(plan)
+
+    def test_a_row_from_reports(self):
+        tables = self.tables("bare_walk+bare_phone", {"": (12, 1), " back": (11, 0)})
         self.assertEqual(tables.missed(), ["bare_walk+bare_phone: 1 wrong"])
         self.assertIn("| yes | yes | 0.020 / 0.020 | 0.010, 0.010 | 0.010, 0.010 | 12, 1 | 1.50 | 1 wrong |", tables.text())
+
+    def test_the_other_order_counts_too(self):
+        self.assertEqual(self.tables("bare_walk+bare_phone", {"": (12, 0), " back": (11, 2)}).missed(), ["bare_walk+bare_phone: 2 wrong"])
+        self.assertEqual(self.tables("plant_walk+yard_west", {" back": (3, 3)}).missed(), ["plant_walk+yard_west: 3 constraints"])
 
 
 if __name__ == "__main__":

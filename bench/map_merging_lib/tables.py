@@ -20,9 +20,9 @@ class Row:
     fused: list = field(default_factory=list)  # the same in the session
     joint: list = field(default_factory=list)  # of the joint map, for both orders
     apart: bool = True
-    constraints: int = 0  # accepted between the recordings
-    wrong: int = 0  # of these and of the loops within maps
-    nees: float | None = None  # per dimension
+    constraints: int = 0  # accepted between the recordings, in the order with more of them
+    wrong: int = 0  # of these and of the loops within maps, in the worse order
+    nees: float | None = None  # per dimension, of `constraints`
     vio: list = field(default_factory=list)  # faults of the odometry alone
 
     def missed(self):
@@ -83,15 +83,16 @@ class Tables:
     def _row(self, session):
         where = self.plan.WHERE
         row = Row(session)
-        report = self.measured.report(where, session.name)
-        if not report or not self.measured.report(where, session.name + " back"):
+        reports = [self.measured.report(where, name) for name in (session.name, session.name + " back")]
+        if None in reports:
             row.vio.append("no value")
             row.joint = [None, None]
             return row
         row.apart = not self.measured.fused(where, session.name)
         row.joint = [self.measured.joint(where, name).value for name in (session.name, session.name + " back")]
-        row.constraints, _, row.nees = _constraints(report["constraints_truth"]["inter"])
-        row.wrong = report["constraints_truth"]["wrong"]
+        truths = [report["constraints_truth"] for report in reports]
+        row.constraints, _, row.nees = max((_constraints(truth["inter"]) for truth in truths), key=lambda found: found[0])
+        row.wrong = max(truth["wrong"] for truth in truths)
         for name in session.names:
             agent = self.plan.agents[where, name].id
             row.alone.append(self.measured.server(where, name, agent).value)
