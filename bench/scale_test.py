@@ -9,10 +9,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 from scale_lib.tables import is_good, ratios, table  # noqa: E402
 
 
-def run(keyframes, ms, fused_after=3, ready_s=1.0):
-    agent = {"hall": 0, "model": -1, "accepted": 10, "refused": 2, "wrong": 1, "fused_after": fused_after,
-             "other_halls": 0, "joint_ate_m": 0.02}
-    return {"keyframes": keyframes, "halls": 4, "longest_solve_ms": 5.0, "agents": [agent, agent],
+def run(keyframes, ms, fused_after=3, ready_s=1.0, accepted=10, ate_m=0.02, recognition_alone=False):
+    agent = {"hall": 0, "model": -1, "accepted": accepted, "refused": accepted // 5, "wrong": 1, "fused_after": fused_after,
+             "other_halls": 0, "joint_ate_m": ate_m}
+    return {"keyframes": keyframes, "halls": 4, "longest_solve_ms": 5.0, "agents": [agent, agent], "recognition_alone": recognition_alone,
             "processes": {"fusion": {"ms_a_keyframe": ms, "kept_kb_a_keyframe": 0.2}},
             "starts": [{"fusion": {"ready_s": ready_s, "cpu_s": 2.0, "memory_mb": 3}}]}
 
@@ -30,6 +30,12 @@ class ScaleTest(unittest.TestCase):
         self.assertTrue(is_good(run(1008, 20.0)))
         self.assertFalse(is_good(run(1008, 20.0, fused_after=-1)))
         self.assertFalse(is_good(run(1008, 20.0, ready_s=None)))
+
+    def test_an_agent_that_was_never_recognised_is_not_good(self):
+        alone = {"fused_after": -1, "accepted": 0, "ate_m": -1}
+        self.assertFalse(is_good(run(1008, 20.0, **alone)))
+        self.assertTrue(is_good(run(1008, 20.0, recognition_alone=True, **alone)))
+        self.assertIn("| joint ATE, mm, worst hall | – | 20.0 | – |", table([run(1008, 20.0, **alone), run(1008, 20.0)]))
 
 
 if __name__ == "__main__":

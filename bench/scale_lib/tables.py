@@ -10,8 +10,8 @@ def ready_s(start):
 
 
 def is_good(run):
-    agents = run.get("agents") or []
-    fused = all(agent["fused_after"] > 0 for agent in agents if agent["accepted"] + agent["refused"] > 0)
+    """With recognition alone nobody is fused."""
+    fused = run["recognition_alone"] or all(n > 0 for n in of_agents(run, "fused_after"))
     return fused and all(ready_s(start) is not None for start in run["starts"])
 
 
@@ -56,6 +56,12 @@ def wrong(run):
     return f"{sum(of_agents(run, 'wrong'))} of {sum(of_agents(run, 'accepted'))}"
 
 
+def worst_ate_mm(run):
+    """None if a hall has no error: no pose of its agent is known."""
+    metres = of_agents(run, "joint_ate_m")
+    return 1e3 * max(metres) if metres and min(metres) >= 0 else None
+
+
 def table(runs):
     names = [f"{run['keyframes']}, {run['halls']}" for run in runs]
     lines = ["| " + " | ".join(["keyframes, halls", *names, "each, of the one before"]) + " |", "|" + "---|" * (len(runs) + 2)]
@@ -64,8 +70,7 @@ def table(runs):
     lines.append(line("longest solve, CPU ms", [run["longest_solve_ms"] for run in runs]))
     lines.append(line("keyframes until an agent is fused", [], [fused_after(run) for run in runs]))
     lines.append(line("wrong constraints", [], [wrong(run) for run in runs]))
-    ate = [of_agents(run, "joint_ate_m") for run in runs]
-    lines.append(line("joint ATE, mm, worst hall", [1e3 * max(values, default=0) for values in ate]))
+    lines.append(line("joint ATE, mm, worst hall", [worst_ate_mm(run) for run in runs]))
     for number_of_start in range(min(len(run["starts"]) for run in runs)):
         ready = [ready_s(run["starts"][number_of_start]) for run in runs]
         cpu = [sum(process["cpu_s"] for process in run["starts"][number_of_start].values()) for run in runs]
