@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <fstream>
 #include <functional>
 #include <map>
@@ -156,6 +157,7 @@ void Measure(const Walk& walk, const Subject& subject, const std::vector<int>& c
   for (const int count : counts) {
     const int first = taken;
     double take_ms = 0, look_ms = 0;
+    int looked = 0;
     uint64_t hash = 0;
     for (; taken < count; ++taken) {
       const Keyframe keyframe = walk.At(taken);
@@ -164,6 +166,7 @@ void Measure(const Walk& walk, const Subject& subject, const std::vector<int>& c
       if (look) {
         hash = (hash ^ subject.look(keyframe)) * 0x9e3779b97f4a7c15;
         look_ms += CpuMs() - begin;
+        ++looked;
       } else {
         subject.take(keyframe);
         take_ms += CpuMs() - begin;
@@ -172,8 +175,8 @@ void Measure(const Walk& walk, const Subject& subject, const std::vector<int>& c
     const double now = HeapBytes();
     fmt::print("| {} | {:.1f} | {:.1f} | {:.2f} | {:.3f} | {:.3f} | {:x} |\n", count,
                1e-6 * (now - heap), 1e-6 * (ResidentBytes() - resident),
-               1e-3 * (now - last_heap) / (count - first), take_ms / (count - first),
-               look_ms / looks, hash);
+               1e-3 * (now - last_heap) / (count - first),
+               take_ms / std::max(1, count - first - looked), look_ms / std::max(1, looked), hash);
     std::fflush(stdout);
     last_heap = now;
   }
@@ -189,7 +192,14 @@ int main(int argc, char** argv) {
   std::vector<std::string> logs;
   std::vector<int> counts{1000, 4000};
   int looks = 100;
-  app.add_option("--process", process, "whose core is measured")->required();
+  const auto subjects = pangea::bench::Subjects();
+  std::vector<std::string> names;
+  for (const auto& [name, make] : subjects) {
+    names.push_back(name);
+  }
+  app.add_option("--process", process, "whose core is measured")
+      ->required()
+      ->check(CLI::IsMember(names));
   app.add_option("--keyframes", counts, "numbers of keyframes, ascending")->capture_default_str();
   app.add_option("--looks", looks, "of them the last so many are recognised, the others only kept")
       ->capture_default_str();
@@ -197,7 +207,7 @@ int main(int argc, char** argv) {
   CLI11_PARSE(app, argc, argv);
   try {
     const pangea::bench::Walk walk(pangea::bench::ReadAll(logs));
-    pangea::bench::Measure(walk, pangea::bench::Subjects().at(process)(), counts, looks);
+    pangea::bench::Measure(walk, subjects.at(process)(), counts, looks);
     return 0;
   } catch (const std::exception& error) {
     fmt::print(stderr, "pangea-memory-bench: {}\n", error.what());

@@ -7,8 +7,11 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <cstdio>
 #include <map>
+#include <optional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -24,7 +27,7 @@ namespace {
 constexpr int64_t kDay_us = int64_t{24} * 3600 * 1'000'000;
 constexpr int64_t kFirst_utime = 1'790'000'000'000'000;
 // An accepted constraint with a larger error is wrong (bench/README.md).
-constexpr double kWrong_m = 0.5;
+constexpr double kWrong_m = 0.5, kWrong_rad = 5 * M_PI / 180;
 constexpr int64_t kTruthGap_us = 100'000;
 
 struct Recording {
@@ -34,10 +37,14 @@ struct Recording {
 
 std::vector<Recording> ReadRecordings(const std::vector<std::string>& logs,
                                       const std::vector<std::string>& truths) {
+  if (logs.size() != truths.size()) {
+    throw std::runtime_error(fmt::format("{} --logs, but {} --truth: give one for each log",
+                                         logs.size(), truths.size()));
+  }
   std::vector<Recording> recordings;
   for (size_t i = 0; i < logs.size(); ++i) {
     const auto agent = static_cast<int32_t>(i + 1);
-    Input input = ReadInput({{agent, logs[i], truths.at(i)}});
+    Input input = ReadInput({{agent, logs[i], truths[i]}});
     recordings.push_back({std::move(input.keyframes), std::move(input.truth[agent])});
   }
   return recordings;
@@ -95,13 +102,19 @@ class Bench {
   }
 
  private:
-  Rigid3 Truth(const KeyframeId& id) const {
-    return Interpolate(*truth_.at(id.map), utime_.at(id), kTruthGap_us).value_or(Rigid3());
+  // Nothing where the ground truth has a gap.
+  std::optional<Rigid3> Truth(const KeyframeId& id) const {
+    return Interpolate(*truth_.at(id.map), utime_.at(id), kTruthGap_us);
   }
 
   bool IsWrong(const Constraint& constraint) const {
-    const Rigid3 T = Truth(constraint.from).Inverse() * Truth(constraint.to);
-    return (T.t - constraint.T_from_to.t).norm() > kWrong_m;
+    const std::optional<Rigid3> from = Truth(constraint.from), to = Truth(constraint.to);
+    if (!from || !to) {
+      return false;
+    }
+    const Rigid3 T = from->Inverse() * *to;
+    return (T.t - constraint.T_from_to.t).norm() > kWrong_m ||
+           T.q.angularDistance(constraint.T_from_to.q) > kWrong_rad;
   }
 
   void Count(Row* row) const {
@@ -117,7 +130,9 @@ class Bench {
     for (const MapState& state : states) {
       std::map<MapId, std::vector<PosePair>> pairs;
       for (const KeyframePose& pose : state.keyframes) {
-        pairs[pose.id.map].push_back({pose.utime, pose.T_map_body, Truth(pose.id)});
+        if (const auto truth = Truth(pose.id)) {
+          pairs[pose.id.map].push_back({pose.utime, pose.T_map_body, *truth});
+        }
       }
       if (!pairs.contains(newest)) {
         continue;
