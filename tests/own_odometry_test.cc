@@ -58,6 +58,19 @@ TEST(OwnOdometry, FusesWithAnAgentOfVio) {
   std::cout << "joint ATE " << report["ate_joint_m"] << " m\n";
   EXPECT_LT(report["ate_joint_m"].get<double>(), 0.1) << outcome.output;
 
+  // Two seconds without poses: the odometry was lost.
+  Trajectory holed = ReadTrajectory(path("poses.tum"), &warnings);
+  const int64_t lost_utime = holed.front().utime + 6'000'000;
+  std::erase_if(holed, [lost_utime](const StampedPose& pose) {
+    return pose.utime > lost_utime && pose.utime < lost_utime + 2'000'000;
+  });
+  WriteTum(path("holed.tum"), holed);
+  outcome = RunCommand("pangea-own-odometry-example --agent 2 --recording " + walk_2 + " --poses " +
+                       path("holed.tum") + " --out-keyframes " + path("maps.lcm") +
+                       " && pangea-log list " + path("maps.lcm") +
+                       " --fields | grep -o 'opened_utime = [0-9]*' | sort -u | wc -l");
+  EXPECT_NE(outcome.output.find("keyframes\n2\n"), std::string::npos) << outcome.output;
+
   outcome = RunCommand("pangea-own-odometry-example --agent 2 --recording " + walk_1 + " --poses " +
                        path("out/agent_1.tum") + " --out-keyframes " + path("no/such/folder.lcm"));
   EXPECT_EQ(outcome.exit_code, 1);

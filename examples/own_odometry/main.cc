@@ -52,10 +52,15 @@ void Play(const Arguments& arguments) {
     constexpr int64_t kMaxGap_us = 200'000;
     const int64_t utime = recording.images()[i].utime;
     const auto T_odom_body = Interpolate(poses, utime, kMaxGap_us);
+    if (!T_odom_body) {  // the odometry is lost; if it stays so, its next pose begins a new map
+      process.AddImage(utime, cv::Mat(), std::nullopt);
+      nobody.Drain();
+      continue;
+    }
     std::string why;
-    const cv::Mat image = T_odom_body ? recording.LoadImage(i, &why) : cv::Mat();
+    const cv::Mat image = recording.LoadImage(i, &why);
     if (image.empty()) {
-      std::cerr << (why.empty() ? "" : fmt::format("warning: {}\n", why));
+      std::cerr << fmt::format("warning: {}\n", why);
       continue;
     }
     if (const auto keyframe = process.AddImage(utime, image, T_odom_body)) {
