@@ -33,9 +33,10 @@ function align(map, T_map_body, T_body_viewer, viewerPose) {
   body.updateMatrix();
   const T_map_viewer = body.matrix.clone().multiply(T_body_viewer);
   const T_xr_viewer = new THREE.Matrix4().fromArray(viewerPose.transform.matrix);
+  const p_map_viewer = new THREE.Vector3().setFromMatrixPosition(T_map_viewer);
+  const p_xr_viewer = new THREE.Vector3().setFromMatrixPosition(T_xr_viewer);
   const T_xr_map = T_xr_viewer.multiply(T_map_viewer.invert());
   const forward = new THREE.Vector3(0, 0, 1).transformDirection(T_xr_map);
-  const origin = new THREE.Vector3().setFromMatrixPosition(T_xr_map);
-  map.position.copy(origin);
-  map.rotation.set(0, Math.atan2(forward.x, forward.z), 0);  // gravity is known: yaw alone
+  map.rotation.set(0, Math.atan2(forward.x, forward.z), 0);  // gravity is known: yaw alone, about the viewer
+  map.position.copy(p_xr_viewer).sub(p_map_viewer.applyEuler(map.rotation));
 }

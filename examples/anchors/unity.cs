@@ -22,8 +22,10 @@ async Task Listen(Transform map, GameObject prefab, CancellationToken stop) {
             n += part.Count;
         } while (!part.EndOfMessage);
         var anchor = JsonUtility.FromJson<Anchor>(System.Text.Encoding.UTF8.GetString(buffer, 0, n));
-        if (anchor.type == "gone") { if (shown.Remove(anchor.id, out var old)) Destroy(old); continue; }
-        if (anchor.pose?.position == null || anchor.pose.position.Length < 3) continue;  // not placed yet
+        if (anchor.type == "gone" || anchor.pose?.position == null || anchor.pose.position.Length < 3) {  // or it has no place now
+            if (shown.Remove(anchor.id, out var old)) Destroy(old);
+            continue;
+        }
         if (!shown.ContainsKey(anchor.id)) shown[anchor.id] = Instantiate(prefab, map);
         Place(shown[anchor.id].transform, anchor.pose);
     }

@@ -74,7 +74,10 @@ def time_offset_of_first_row(text, readout_s):
     """docs/recordings.md: our offset is the first row's, Kalibr's the middle row's."""
     ours, kalibr = field(text, "time_offset_s", None), field(text, "timeshift_cam_imu", None)
     row = field(text, "stamp_row", "middle" if kalibr and not ours else "first")
-    return float(ours or kalibr or 0) - {"first": 0, "middle": 0.5, "last": 1}[row] * readout_s
+    shares = {"first": 0, "middle": 0.5, "last": 1}
+    if row not in shares:
+        raise ValueError(f"stamp_row: {row}: give {', '.join(shares)}")
+    return float(ours or kalibr or 0) - shares[row] * readout_s
 
 
 class Recording:
@@ -87,6 +90,8 @@ class Recording:
         except ValueError as error:
             fail(f"{mav0}/cam0/sensor.yaml or imu0/sensor.yaml: {error}")
         self.events = sorted([*self._imu(mav0), *self._images(mav0)], key=lambda event: event[0])
+        if not self.events:
+            fail(f"{mav0}: imu0/data.csv and cam0/data.csv have no rows")
 
     def _camera(self, mav0):
         path, imu_path = mav0 / "cam0/sensor.yaml", mav0 / "imu0/sensor.yaml"
@@ -97,6 +102,8 @@ class Recording:
         camera.width, camera.height = map(int, numbers(text, "resolution", path))
         camera.fx, camera.fy, camera.cx, camera.cy = numbers(text, "intrinsics", path)
         camera.distortion = numbers(text, "distortion_coefficients", path)
+        if len(camera.distortion) != 4:
+            fail(f"{path}: distortion_coefficients: give 4 numbers, not {len(camera.distortion)}")
         camera.readout_s = float(field(text, "readout_s", 0))
         camera.time_offset_s = time_offset_of_first_row(text, camera.readout_s)
         set_transform(camera.T_body_cam, *relative(transform(imu_path.read_text(), imu_path), transform(text, path)))
