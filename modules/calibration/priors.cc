@@ -10,7 +10,7 @@ constexpr double kSigmaAxisAligned = 0.25;
 constexpr double kSigmaGyroBias = 0.1;  // rad/s
 constexpr double kSigmaLogFocal = 0.3;
 constexpr double kSigmaGivenLogFocal = 0.1;  // if a field of view is given
-constexpr double kSigmaDistortionEquidistant = 0.03;
+constexpr double kSigmaDistortion = 0.15, kSigmaDistortionEquidistant = 0.03;
 constexpr double kReadout_s = 0.015;
 constexpr double kGuessedField = 1.13;  // rad
 

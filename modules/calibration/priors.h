@@ -9,7 +9,6 @@ namespace pangea::calibration {
 constexpr double kSigmaGivenRotation = 0.1;  // rad
 constexpr double kSigmaTimeOffset_s = 0.1;
 constexpr double kSigmaCentre = 0.02;  // relative to the wider side
-constexpr double kSigmaDistortion = 0.15;
 constexpr double kSigmaReadout_s = 0.012;
 // interval_share is 1/2 if stamps are of the start of the exposure, -1/2 for its end, -3/2 for one
 // image later.

@@ -81,8 +81,15 @@ TEST_F(Program, WhatIsWrittenIsReadAgain) {
   read.gyro_bias = some.parameters.gyro_bias;
   EXPECT_LT(read.Minus(some.parameters).cwiseAbs().maxCoeff(), 1e-6);
   EXPECT_EQ(camera.kind, CameraModel::Kind::kEquidistant);
-  WriteTextFile(Path("imu.yaml"), ImuYaml(some, {.gyro_noise_density = 7e-4}));
-  EXPECT_DOUBLE_EQ(ReadEurocImuCalibration(Path("imu.yaml")).noise.gyro_noise_density, 7e-4);
+  WriteTextFile(Path("imu.yaml"), ImuYaml(some, {.gyro_noise_density = 7e-4,
+                                                 .gyro_scale_sigma = 0.02,
+                                                 .accel_scale_sigma = 0.03,
+                                                 .axes_sigma = 0}));
+  const ImuNoise noise = ReadEurocImuCalibration(Path("imu.yaml")).noise;
+  EXPECT_DOUBLE_EQ(noise.gyro_noise_density, 7e-4);
+  EXPECT_DOUBLE_EQ(noise.gyro_scale_sigma, 0.02);
+  EXPECT_DOUBLE_EQ(noise.accel_scale_sigma, 0.03);
+  EXPECT_EQ(noise.axes_sigma, 0);
 }
 
 TEST_F(Program, WhatIsWrittenIsKnownToReaders) {
@@ -168,6 +175,10 @@ TEST(Summary, SaysWhatTheMotionDidNotTell) {
   input.width = 640;
   input.height = 480;
   EXPECT_THAT(Summary(input, result), Not(HasSubstr("not told")));
+  result.sigma[kDistortion] = 0.028;  // the prior of an equidistant lens is 0.03
+  EXPECT_THAT(Summary(input, result), HasSubstr("as assumed"));
+  result.sigma[kDistortion] = 1e-3;
+  EXPECT_THAT(Summary(input, result), Not(HasSubstr("as assumed")));
   result.sigma[kReadout] = 0.011;
   EXPECT_THAT(Summary(input, result), HasSubstr("as assumed"));
   EXPECT_THAT(Summary(input, result), HasSubstr("per change of the image interval"));

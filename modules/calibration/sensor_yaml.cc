@@ -58,6 +58,9 @@ std::string ImuYaml(const Result& result, const ImuNoise& noise) {
                       noise.gyro_noise_density, noise.gyro_random_walk);
   text += fmt::format("accelerometer_noise_density: {:.6g}\naccelerometer_random_walk: {:.6g}\n",
                       noise.accel_noise_density, noise.accel_random_walk);
+  text += fmt::format("gyroscope_scale_sigma: {:.6g}\naccelerometer_scale_sigma: {:.6g}\n",
+                      noise.gyro_scale_sigma, noise.accel_scale_sigma);
+  text += fmt::format("axes_sigma: {:.6g}\n", noise.axes_sigma);
   text += fmt::format("gyroscope_bias: {}  # rad/s\ngyroscope_bias_sigma: {}\n",
                       List(result.parameters.gyro_bias), List(result.sigma.segment<3>(kGyroBias)));
   return text;

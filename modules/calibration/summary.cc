@@ -42,7 +42,7 @@ std::string Values(const Input& input, const Result& result) {
   text += Row(fisheye ? "distortion (equidistant)" : "distortion (radial-tangential)",
               fmt::format("{:.4f}, {:.4f}", c.distortion[0], c.distortion[1]),
               fmt::format("{:.4f}, {:.4f}", s[kDistortion], s[kDistortion + 1]),
-              s[kDistortion] < kTold * kSigmaDistortion);
+              s[kDistortion] < kTold * PriorOf(input, result.parameters).sigma[kDistortion]);
   const Eigen::Matrix3d R = c.T_body_cam.R();
   for (int axis = 0; axis < 3; ++axis) {
     text += Row(fmt::format("camera's {} in the IMU's axes", kAxisNames[axis]),
