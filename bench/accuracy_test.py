@@ -16,7 +16,7 @@ sys.dont_write_bytecode = True
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from accuracy_lib import anchors  # noqa: E402
 from accuracy_lib.metrics import Measured, Sample, Series  # noqa: E402
-from accuracy_lib.jobs import OUT, Command, Job, Runner  # noqa: E402
+from accuracy_lib.jobs import OUT, Command, Job, Runner, remarks  # noqa: E402
 from accuracy_lib.plan import Plan, RenderJob  # noqa: E402
 
 
@@ -72,6 +72,17 @@ class RunnerTest(unittest.TestCase):
         jobs = self.chain()
         jobs.append(Job("vio", "absent", self.work / "absent", [Command(["/nowhere/program"])], main_product="x"))
         self.assertEqual(self.run_jobs(jobs), ["done", "done", "failed"])
+
+    def test_what_failed_and_what_another_build_made_is_told(self):
+        program = self.work / "program"
+        program.write_text(f'#!/bin/sh\ncp {self.work}/source "$1"/a\n')
+        program.chmod(0o755)
+        jobs = [Job("vio", "first", self.work / "first", [Command([str(program), OUT])], main_product="a"),
+                Job("server", "second", self.work / "second", [shell("false")], main_product="b")]
+        self.run_jobs(jobs)
+        self.assertEqual(remarks(jobs), ["- failed: server second"])
+        program.write_text(program.read_text() + "# changed\n")
+        self.assertEqual(remarks(jobs)[0], "- vio: 1 products are of another build of the program (`--redo` makes them again)")
 
     def test_a_missing_product_fails_the_job(self):
         self.assertEqual(self.run_jobs(self.chain(first="true")), ["failed", "skipped"])

@@ -16,6 +16,7 @@ from pathlib import Path
 
 OUT = "{out}"  # in a command: the folder that is being made
 GOING = ("waiting", "wanted", "running")
+MEASURED = ("vio", "server", "link")  # kinds of jobs whose products have what the tables show
 
 
 @functools.cache
@@ -90,6 +91,14 @@ class Job:
         if self.folder.exists():
             shutil.rmtree(self.folder)
         part.rename(self.folder)
+
+
+def remarks(jobs):
+    """Lines on what the tables do not show: jobs that did not end well, and products of another build."""
+    stale = {kind: sum(job.stale() for job in jobs if job.kind == kind and job.record()) for kind in MEASURED}
+    lines = [f"- {kind}: {number} products are of another build of the program (`--redo` makes them again)"
+             for kind, number in stale.items() if number]
+    return lines + [f"- {job.state}: {job.kind} {job.name}" for job in jobs if not job.ended_well]
 
 
 class Running:
