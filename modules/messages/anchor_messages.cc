@@ -41,13 +41,21 @@ bool IsZero(const float* values) {
   return std::all_of(values, values + 36, [](float v) { return v == 0; });
 }
 
+bool IsZero(const quaternion_t& q) { return q.w == 0 && q.x == 0 && q.y == 0 && q.z == 0; }
+
 // Parses the fields about the place. Returns why they are refused, or an empty string.
 std::string ParsePlace(const anchor_edit_t& m, AnchorEdit* edit) {
   const auto map = Parse(m.map);
-  const auto T_ref_anchor = Parse(m.T_ref_anchor);
-  if (!map.value || !T_ref_anchor.value || m.keyframe_seq < 0 || m.keyframe_seq > kMaxSeq ||
-      !IsUtime(m.utime)) {
-    return "anchor edit: invalid map, keyframe, time or transform";
+  if (!map.value || m.keyframe_seq < 0 || m.keyframe_seq > kMaxSeq || !IsUtime(m.utime)) {
+    return "anchor edit: invalid map, keyframe or time";
+  }
+  // A pixel needs no transform, so an app may leave it as it is in a new message.
+  const bool is_needed = m.placement != anchor_edit_t::PLACEMENT_PIXEL;
+  const auto T_ref_anchor = is_needed || !IsZero(m.T_ref_anchor.rotation)
+                                ? Parse(m.T_ref_anchor)
+                                : Parsed<Rigid3>{Rigid3(), ""};
+  if (!T_ref_anchor.value) {
+    return "anchor edit: T_ref_anchor: " + T_ref_anchor.refused;
   }
   const Eigen::Vector2d pixel(m.pixel[0], m.pixel[1]);
   if (!pixel.allFinite() || pixel.cwiseAbs().maxCoeff() > kMaxPixel) {

@@ -75,6 +75,14 @@ TEST(AnchorMessages, AnEditThatMovesNothingNeedsNoPlace) {
   EXPECT_TRUE(Parse(message).value);
 }
 
+TEST(AnchorMessages, AnEditAtAPixelNeedsNoTransform) {
+  anchor_edit_t message = ToMessage(Edit());
+  message.T_ref_anchor = {};
+  EXPECT_TRUE(Parse(message).value);
+  message.placement = anchor_edit_t::PLACEMENT_BODY;
+  EXPECT_EQ(Parse(message).refused, "anchor edit: T_ref_anchor: quaternion is not of unit norm");
+}
+
 TEST(AnchorMessages, AStateThereAndBack) {
   const AnchorState state = State();
   const auto parsed = Parse(ToMessage(state));
