@@ -167,6 +167,15 @@ class Examples(unittest.TestCase):
         self.assertRegex(said()[1], r"^euroc_source: .*cam0/data\.csv:2: 'x,a\.png': give a stamp in ns")
         self.write("imu0/data.csv", "1000000,0,0\n")
         self.assertRegex(said()[1], r"^euroc_source: .*imu0/data\.csv:1: '1000000,0,0': give a stamp in ns, three numbers")
+        for name in ("cam0/data.csv", "imu0/data.csv"):
+            self.write(name, "#stamp\n")
+        self.assertRegex(said()[1], r"^euroc_source: .*mav0: imu0/data\.csv and cam0/data\.csv have no rows")
+        camera = (self.mav0 / "cam0/sensor.yaml").read_text()
+        self.write("cam0/sensor.yaml", camera + "stamp_row: upper\n")
+        self.assertRegex(said()[1], r"^euroc_source: .*sensor\.yaml: stamp_row: upper: give first, middle, last")
+        self.write("cam0/sensor.yaml", camera.replace("[0, 0, 0, 0]", "[0, 0, 0, 0, 0]"))
+        self.assertRegex(said()[1], r"^euroc_source: .*cam0/sensor\.yaml: distortion_coefficients: give 4 numbers, not 5")
+        self.write("cam0/sensor.yaml", camera)
         (self.mav0 / "imu0/data.csv").unlink()
         self.assertRegex(said()[1], r"^euroc_source: /.*imu0/data\.csv: No such file or directory\n$")
 
