@@ -7,9 +7,11 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <string>
 
 #include "messages/channels.h"
 #include "pangea/status_t.hpp"
@@ -98,6 +100,22 @@ TEST_F(ReportFilesTest, BytesThatNobodyCountedAreTheUplinks) {
   EXPECT_EQ(report["agents"][0]["bytes_up"], 250'000);
   EXPECT_EQ(report["agents"][0]["bytes_down"], 900);
   EXPECT_EQ(report["agents"][1]["bytes_up"], 600'000);
+}
+
+TEST_F(ReportFilesTest, GroundTruthWithTooFewPosesIsSaid) {
+  LogBoth();
+  const std::string csv = Recording(1) + "/mav0/state_groundtruth_estimate0/data.csv";
+  std::ifstream rows(csv);
+  std::string row, two_a_second;
+  for (int i = 0; std::getline(rows, row); ++i) {
+    two_a_second += i % 50 == 3 ? row + "\n" : "";
+  }
+  std::ofstream(csv) << two_a_second;
+  const json report = Report();
+  EXPECT_TRUE(report["agents"][0]["ate_vio_m"].is_null());
+  EXPECT_THAT(report["notes"], Contains(testing::AllOf(
+                                   HasSubstr("agent 1: 0 of its "),
+                                   HasSubstr("more than 0.1 s apart ground truth is not used"))));
 }
 
 TEST_F(ReportFilesTest, ASecondMapOfAnAgentHasFilesOfItsOwn) {

@@ -167,8 +167,15 @@ AgentMetrics MetricsOf(const AgentRun& run, const CapturedSession& session,
   const Trajectory keyframes =
       groups.empty() ? Trajectory() : groups[agent.group].group.TrajectoryOf(agent.id);
   if (!agent.ground_truth.empty()) {
-    agent.vio = AbsoluteError(Associate(agent.odometry[agent.main_map], agent.ground_truth),
-                              TrajectoryAlignmentKind::kSe3);
+    const Trajectory& odometry = agent.odometry[agent.main_map];
+    const std::vector<PosePair> pairs = Associate(odometry, agent.ground_truth);
+    if (!odometry.empty() && pairs.size() < kMinPairs) {
+      notes->push_back(fmt::format(
+          "agent {}: {} of its {} poses have ground truth at their time, so no error; between two "
+          "of its poses more than {} s apart ground truth is not used",
+          run.id, pairs.size(), odometry.size(), 1e-6 * kMaxGroundTruthGapUs));
+    }
+    agent.vio = AbsoluteError(pairs, TrajectoryAlignmentKind::kSe3);
     agent.server =
         AbsoluteError(Associate(keyframes, agent.ground_truth), TrajectoryAlignmentKind::kSe3);
     agent.coverage = Coverage(keyframes, agent.ground_truth);
