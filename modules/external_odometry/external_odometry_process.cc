@@ -36,8 +36,8 @@ bool ExternalOdometryProcess::GoesOn(const Step& now) const {
   const Eigen::Vector3d off = now.T_odom_body.t - last_->T_odom_body.t - last_->v_odom_body * dt;
   const double angle = LogSo3(last_->T_odom_body.q.conjugate() * now.T_odom_body.q).norm();
   const bool long_lost = lost_ && now.utime - last_->utime > kMaxLost_us;
-  return !long_lost && off.norm() <= kMaxStep_m + kMaxAcceleration * dt * dt &&
-         angle <= kMaxRotation * dt;
+  const double reach_m = last_->has_velocity ? kMaxAcceleration * dt * dt : kMaxSpeed * dt;
+  return !long_lost && off.norm() <= kMaxStep_m + reach_m && angle <= kMaxRotation * dt;
 }
 
 std::optional<Keyframe> ExternalOdometryProcess::AddImage(
@@ -68,6 +68,7 @@ std::optional<Keyframe> ExternalOdometryProcess::AddImage(
   } else if (last_) {
     now.v_odom_body = (now.T_odom_body.t - last_->T_odom_body.t) /
                       (1e-6 * static_cast<double>(now.utime - last_->utime));
+    now.has_velocity = true;
   }
   last_ = now;
   lost_ = false;

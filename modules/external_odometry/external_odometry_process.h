@@ -27,10 +27,12 @@ class ExternalOdometryProcess : public Process {
   // If the odometry is lost for longer, the next pose begins a new map.
   static constexpr int64_t kMaxLost_us = 500'000;
   // A pose is a jump if it deviates from a constant velocity by more than kMaxStep_m +
-  // kMaxAcceleration * dt^2, or if it rotates faster than kMaxRotation.
+  // kMaxAcceleration * dt^2, or if it rotates faster than kMaxRotation. The first two poses of a
+  // map have no velocity before them: there a jump is faster than kMaxSpeed.
   static constexpr double kMaxStep_m = 0.1;
   static constexpr double kMaxAcceleration = 20;  // m/s^2
   static constexpr double kMaxRotation = 10;      // rad/s
+  static constexpr double kMaxSpeed = 50;         // m/s
 
   // `open_map` returns the opened_utime of each new map, ascending. `now_utime`: wall clock.
   ExternalOdometryProcess(Bus& bus, int32_t agent_id, const CameraModel& camera,
@@ -58,6 +60,7 @@ class ExternalOdometryProcess : public Process {
     int64_t utime = 0;
     Rigid3 T_odom_body;
     Eigen::Vector3d v_odom_body = Eigen::Vector3d::Zero();
+    bool has_velocity = false;  // false: the first pose of a map
   };
   bool GoesOn(const Step& now) const;
   void Publish(const Step& now, bool tracking);

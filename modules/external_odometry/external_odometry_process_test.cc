@@ -88,6 +88,18 @@ TEST_F(ExternalOdometryTest, AQuickStartIsMotion) {
   EXPECT_EQ(Maps(), 1);
 }
 
+// As of a car. Without a velocity before it each second pose was a jump, and each image a map.
+TEST_F(ExternalOdometryTest, AMapMayBeginInFastMotion) {
+  for (int i = 0; i < 20; ++i) {
+    x_m_ += 1.5;
+    Add(Rigid3{Eigen::Quaterniond::Identity(), {x_m_, 0, 1.5}});
+  }
+  EXPECT_EQ(Maps(), 1);
+  x_m_ += 1;
+  Add(Rigid3{Eigen::Quaterniond::Identity(), {x_m_ + 1.5, 0, 1.5}});
+  EXPECT_EQ(Maps(), 2);
+}
+
 TEST_F(ExternalOdometryTest, ShortlyLostGoesOnLongLostDoesNot) {
   Walk(20);
   Add(std::nullopt);
