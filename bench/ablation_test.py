@@ -79,6 +79,10 @@ class WorseCalibrationTest(unittest.TestCase):
     def test_exact_stays_exact(self):
         self.assertEqual(worse_calibration(CAMERA, [], 1), CAMERA)
 
+    def test_a_field_that_is_missing_is_named(self):
+        with self.assertRaisesRegex(SystemExit, "lacks the field 'intrinsics'"):
+            numbers("cam0:\n  T_cam_imu: 1\n", "intrinsics")
+
     def test_extrinsics_are_off_by_so_much(self):
         for seed in (1, 2, 3):
             before, after = numbers(CAMERA, "data"), numbers(worse_calibration(CAMERA, ["extrinsics"], seed), "data")

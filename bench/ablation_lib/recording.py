@@ -23,6 +23,8 @@ IMU_KEYS = ("rate_hz", "gyroscope_noise_density", "gyroscope_random_walk", "acce
 def numbers(text, key):
     """The number, or the list of numbers, behind `key:`."""
     found = re.search(rf"\b{key}:\s*(\[[^\]]*\]|\S+)", text)
+    if not found:
+        raise SystemExit(f"a sensor.yaml lacks the field '{key}': benches read EuRoC's format alone, not Kalibr's")
     values = [float(word) for word in found.group(1).strip("[]").replace("\n", " ").split(",")]
     return values if found.group(1).startswith("[") else values[0]
 
