@@ -172,7 +172,7 @@ AgentMetrics MetricsOf(const AgentRun& run, const CapturedSession& session,
     if (!odometry.empty() && pairs.size() < kMinPairs) {
       notes->push_back(fmt::format(
           "agent {}: {} of its {} poses have ground truth at their time, so no error; between two "
-          "of its poses more than {} s apart ground truth is not used",
+          "of its poses more than {:g} s apart ground truth is not used",
           run.id, pairs.size(), odometry.size(), 1e-6 * kMaxGroundTruthGapUs));
     }
     agent.vio = AbsoluteError(pairs, TrajectoryAlignmentKind::kSe3);
