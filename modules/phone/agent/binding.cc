@@ -73,6 +73,21 @@ val ToObject(const PhonePose& pose) {
   return object;
 }
 
+val ToObject(const CameraModel& camera) {
+  const Eigen::Vector4d& d = camera.distortion;
+  val object = val::object();
+  object.set("model",
+             std::string(camera.kind == CameraModel::Kind::kEquidistant ? "equidistant"
+                                                                        : "radial-tangential"));
+  object.set("width", camera.width);
+  object.set("height", camera.height);
+  object.set("intrinsics", val::array(std::vector{camera.fx, camera.fy, camera.cx, camera.cy}));
+  object.set("distortion", val::array(std::vector{d[0], d[1], d[2], d[3]}));
+  object.set("T_body_cam", ToArray(camera.T_body_cam));
+  object.set("readout_s", camera.readout_s);
+  return object;
+}
+
 val ToObject(const status_t& status) {
   val counters = val::object();
   counters.set("pending", static_cast<double>(status.pending));
@@ -133,6 +148,9 @@ val ToObject(const PhoneEvents& events) {
   object.set("spool", ToArrayOf(events.spool, [](const auto& c) { return ToObject(c); }));
   if (events.pose) {
     object.set("pose", ToObject(*events.pose));
+  }
+  if (events.camera) {
+    object.set("camera", ToObject(*events.camera));
   }
   if (events.anchors) {
     object.set("anchors", ToArrayOf(*events.anchors, [](const auto& a) { return ToObject(a); }));

@@ -16,9 +16,18 @@ namespace {
 
 constexpr int64_t kTickInterval_us = 100'000;
 
-std::optional<KeyframeId> IdOf(Bytes keyframe) {
+struct KeyframeHead {
+  KeyframeId id;
+  std::optional<CameraModel> camera;
+};
+
+std::optional<KeyframeHead> HeadOf(Bytes keyframe) {
   KeyframeMessage message{};
-  return DecodeMessage(keyframe, &message) ? Parse(message.id).value : std::nullopt;
+  if (!DecodeMessage(keyframe, &message)) {
+    return std::nullopt;
+  }
+  const std::optional<KeyframeId> id = Parse(message.id).value;
+  return id ? std::optional(KeyframeHead{*id, Parse(message.camera).value}) : std::nullopt;
 }
 
 }  // namespace
@@ -83,25 +92,28 @@ void PhoneAgent::OnLinkDown(Bytes packet) {
 
 // The keyframe is published as if the odometry had just finished it, so the uplink takes it.
 void PhoneAgent::Restore(const std::string& id, Bytes bytes) {
-  const std::optional<KeyframeId> keyframe = IdOf(bytes);
+  const std::optional<KeyframeHead> keyframe = HeadOf(bytes);
   if (!keyframe) {
     events_.spool.push_back({id, {}});
-  } else if (keyframe->map.agent_id == agent_id_ && uplink_) {
-    spooled_.insert(*keyframe);
+  } else if (keyframe->id.map.agent_id == agent_id_ && uplink_) {
+    spooled_.insert(keyframe->id);
     agent_bus_.Publish(channels::Keyframe(agent_id_), bytes);
     agent_bus_.Drain();
   }
 }
 
 void PhoneAgent::OnKeyframe(Bytes data) {
-  const std::optional<KeyframeId> id = IdOf(data);
+  const std::optional<KeyframeHead> keyframe = HeadOf(data);
   const std::vector<uint8_t> bytes(data.begin(), data.end());
-  if (!id || spooled_.contains(*id)) {
+  if (!keyframe || spooled_.contains(keyframe->id)) {
     return;
   }
+  if (keyframe->camera) {
+    events_.camera = keyframe->camera;
+  }
   if (uplink_) {
-    spooled_.insert(*id);
-    events_.spool.push_back({ToString(*id), bytes});
+    spooled_.insert(keyframe->id);
+    events_.spool.push_back({ToString(keyframe->id), bytes});
   }
   events_.keyframes.push_back(bytes);
 }

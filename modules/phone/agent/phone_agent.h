@@ -21,6 +21,7 @@
 #include "bus/bus.h"
 #include "bus/node.h"
 #include "core/anchor.h"
+#include "core/camera_model.h"
 #include "core/others.h"
 #include "core/server_messages.h"
 #include "messages/catch_up_messages.h"
@@ -52,10 +53,13 @@ struct SpoolChange {
   std::vector<uint8_t> bytes;  // empty: delete
 };
 
-// The output since the last Take. Of poses, statuses, anchors and others only the newest is kept.
+// The output since the last Take. Of poses, cameras, statuses, anchors and others only the newest
+// is kept.
 struct PhoneEvents {
   std::vector<std::vector<uint8_t>> link_up;  // sealed packets, in order
   std::optional<PhonePose> pose;
+  // As the odometry has refined it, by the newest keyframe. What is drawn must agree with it.
+  std::optional<CameraModel> camera;
   std::optional<status_t> vio_status, uplink_status;  // vio_status: of either odometry
   std::optional<std::vector<DrawnAnchor>> anchors;
   std::optional<Others> others;

@@ -237,6 +237,7 @@ TEST(PhoneAgentWithDevicePoses, GivesPosesAndKeyframes) {
     EXPECT_NEAR(events.pose->T_odom_body.t.x(), 0.1 * i, 1e-9);
     keyframes += events.keyframes.size();
     EXPECT_EQ(events.spool.size(), events.keyframes.size());
+    EXPECT_EQ(events.camera.has_value(), !events.keyframes.empty());
   }
   EXPECT_GE(keyframes, 5u);
   EXPECT_EQ(add(std::nullopt).pose->state, pose_t::STATE_LOST);

@@ -1,6 +1,6 @@
 // The messages between the page and the worker that runs the agent. Times are microseconds.
 
-import type { AgentPose, AnchorEdit, Others, Pose7, ProcessStatus, ShownAnchor } from "./agent/phone_agent";
+import type { AgentCamera, AgentPose, AnchorEdit, Others, Pose7, ProcessStatus, ShownAnchor } from "./agent/phone_agent";
 import type { ImuSample } from "./recording/euroc";
 
 // The phone's identity at the server, which it got by joining.
@@ -45,6 +45,7 @@ export type FromWorker =
   | { kind: "failed"; text: string } // the agent cannot be opened, or is broken
   | { kind: "taken"; utime: number } // the agent is done with the image
   | { kind: "pose"; pose: AgentPose }
+  | { kind: "camera"; camera: AgentCamera }
   | { kind: "anchors"; anchors: ShownAnchor[] }
   | { kind: "others"; told: Others }
   | { kind: "status"; vio?: ProcessStatus; uplink?: ProcessStatus; link?: LinkState }

@@ -15,6 +15,7 @@ import { Motion } from "./sensors/motion";
 import { NewestFrame } from "./sensors/newest_frame";
 import { parseCamera } from "./view/camera_model";
 import type { CameraModel } from "./view/camera_model";
+import { matrixOf } from "./view/poses";
 import type { Stage } from "./view/stage";
 import type { XrFrame, XrImage, XrOdometry } from "./xr/xr_odometry";
 
@@ -41,7 +42,7 @@ export class Walk {
   private taken = () => {}; // called when the agent has processed its image
 
   private constructor(
-    readonly camera: CameraModel,
+    public camera: CameraModel, // as refined by the odometry
     private readonly yaml: { camera: string; imu?: string }, // without imu: images have the device's poses
     readonly membership: Membership | undefined,
     private readonly stage: Stage,
@@ -174,6 +175,9 @@ export class Walk {
         this.pose = message.pose;
         this.stage.show(this.camera, message.pose, this.anchors, this.others.in(message.pose.map, performance.now()));
         return this.events.onPose(message.pose);
+      case "camera":
+        this.camera = { ...message.camera, T_body_cam: matrixOf(message.camera.T_body_cam) };
+        return;
       case "anchors":
         this.anchors = message.anchors;
         return;

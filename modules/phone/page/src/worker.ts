@@ -103,6 +103,7 @@ class AgentHost {
     if (this.spool && events.spool.length > 0) {
       this.stored = this.spool.apply(events.spool).catch(storageFailed);
     }
+    if (events.camera) say({ kind: "camera", camera: events.camera });
     if (events.pose) say({ kind: "pose", pose: events.pose });
     if (events.anchors) say({ kind: "anchors", anchors: events.anchors });
     if (events.others) say({ kind: "others", told: events.others });

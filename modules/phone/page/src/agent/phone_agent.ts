@@ -47,6 +47,17 @@ export interface AgentPose {
   numTracked: number;
 }
 
+/** The camera of `core/camera_model.h`. */
+export interface AgentCamera {
+  model: 'radial-tangential' | 'equidistant';
+  width: number;
+  height: number;
+  intrinsics: [number, number, number, number];
+  distortion: [number, number, number, number];
+  T_body_cam: Pose7;
+  readout_s: number;
+}
+
 export interface ProcessStatus {
   text: string;
   /** From STATUS_vio_k or STATUS_uplink_k: its `counters`, `pending`, and for each reason `refused: REASON`. */
@@ -92,6 +103,8 @@ export interface AgentEvents {
   linkUp: Uint8Array[];
   /** The newest pose; absent if no image was processed. */
   pose?: AgentPose;
+  /** The camera as the odometry has refined it. Comes with each new keyframe. */
+  camera?: AgentCamera;
   /** Comes once per second. */
   status?: { vio?: ProcessStatus; uplink?: ProcessStatus };
   /** All anchors that are shown; absent if nothing changed. Comes 20 times per second while one moves, else once per second. */
