@@ -125,5 +125,26 @@ TEST_F(Access, AWorkerStoresResultsAndNothingElse) {
   EXPECT_TRUE(worker.Acknowledge(delivery->ack_subject));
 }
 
+// Its key is kept on no host; without it, a further host would get another authority than the
+// others have.
+TEST(NatsConfig, AnAuthorityIsNotReplacedWhenItsKeyIsElsewhere) {
+  const fs::path folder = fs::path(testing::TempDir()) / "cluster_authority";
+  fs::remove_all(folder);
+  const auto make = [&folder](const std::string& host) {
+    return std::system(fmt::format("{}/packaging/pangea-nats-config --sites hall --hosts {} "
+                                   "--out {} > /dev/null 2>&1",
+                                   PANGEA_SOURCE_DIR, host, folder.string())
+                           .c_str());
+  };
+  ASSERT_EQ(make("10.0.0.1"), 0);
+  const std::string authority = ReadTextFile(folder / "ca.pem");
+  fs::rename(folder / "ca.key", folder / "elsewhere.key");
+  EXPECT_NE(make("10.0.0.2"), 0);
+  EXPECT_EQ(ReadTextFile(folder / "ca.pem"), authority);
+  fs::rename(folder / "elsewhere.key", folder / "ca.key");
+  EXPECT_EQ(make("10.0.0.2"), 0);
+  EXPECT_EQ(ReadTextFile(folder / "ca.pem"), authority);
+}
+
 }  // namespace
 }  // namespace pangea
