@@ -62,9 +62,11 @@ Eigen::AlignedBox2d BoundsOf(const Plot& plot) {
                        : box;
 }
 
-// Rounds the range to multiples of a nice step, about `steps` of them.
+// Rounds the range to multiples of a nice step, about `steps` of them. A range that numbers of this
+// size hardly resolve is widened: its steps could not be counted.
 void Round(int steps, Axis* axis) {
-  if (axis->high <= axis->low) {
+  const double largest = std::max(std::abs(axis->low), std::abs(axis->high));
+  if (axis->high - axis->low <= 1e-9 * largest) {
     axis->high = axis->low + std::max(1e-6, std::abs(axis->low));
   }
   axis->step = NiceStep((axis->high - axis->low) / steps);
@@ -72,7 +74,8 @@ void Round(int steps, Axis* axis) {
   axis->high = axis->step * std::ceil(axis->high / axis->step - 1e-9);
 }
 
-// Widens, on both sides, the range of the axis with the longer unit.
+// Widens, on both sides, the range of the axis with the longer unit. Both axes then have one step,
+// or a straight walk would have as many numbers beside it as its width fits into its length.
 void MakeUnitsEqual(Canvas* canvas) {
   const auto unit = [](const Axis& axis) {
     return std::abs(axis.to - axis.from) / (axis.high - axis.low);
@@ -83,6 +86,7 @@ void MakeUnitsEqual(Canvas* canvas) {
     axis->low -= more / 2;
     axis->high += more / 2;
   }
+  canvas->x.step = canvas->y.step = std::max(canvas->x.step, canvas->y.step);
 }
 
 Canvas CanvasOf(const Plot& plot) {

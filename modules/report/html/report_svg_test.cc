@@ -116,6 +116,32 @@ TEST(ReportSvg, EqualAxesHaveEqualUnitsAndHoldEverything) {
   }
 }
 
+int NumGridLines(const Plot& plot) {
+  const std::string html = ChartHtml(plot, "a test");
+  int count = 0;
+  for (size_t at = html.find("\"grid\""); at != std::string::npos;
+       at = html.find("\"grid\"", at + 1)) {
+    ++count;
+  }
+  return count;
+}
+
+TEST(ReportSvg, AStraightWalkHasFewGridLines) {
+  for (const double sideways : {0.1, 1e-3, 0.0, 1e-15}) {
+    for (const bool along_x : {true, false}) {
+      Plot plot;
+      plot.equal_axes = true;
+      const Eigen::Vector2d end(10, 3 + sideways);
+      plot.lines.push_back({.colour = AgentColour(0), .points = {{0, 3}, end}});
+      if (!along_x) {
+        plot.lines[0].points = {{3, 0}, end.reverse()};
+      }
+      ASSERT_LT(NumGridLines(plot), 40) << sideways;
+      EXPECT_GT(NumGridLines(plot), 3) << sideways;
+    }
+  }
+}
+
 TEST(ReportSvg, NothingAndASinglePointAreDrawnToo) {
   EXPECT_THAT(Draw(Plot()).stretches, SizeIs(0));
   Plot plot;
