@@ -167,5 +167,17 @@ TEST_F(ReportTest, OnlyThePlayedPartOfTheGroundTruthCounts) {
   EXPECT_NEAR(report["agents"][0]["initialised_s"].get<double>(), 2, 1e-6);
 }
 
+// As `start` and an anchor's `at` count it.
+TEST_F(ReportTest, AChangeIsToldInTheTimeOfTheWholeRecording) {
+  LogKeyframes(Map(1), 20, NumKeyframes());
+  LogKeyframes(Map(2), 0, NumKeyframes());
+  LogState(State(1, {Map(1), Map(2)}, 30));
+  input_.agents[0].start_s = 10;
+  fs::remove(input_.agents[0].bus_log);
+  const json change = Report()["fused_at"].at(0);
+  EXPECT_NEAR(change["recording_s"]["1"].get<double>(), Seconds(29), 1e-6);
+  EXPECT_NEAR(change["recording_s"]["2"].get<double>(), Seconds(29), 0.051);
+}
+
 }  // namespace
 }  // namespace pangea::session

@@ -76,7 +76,8 @@ std::optional<double> KilobytesPerSecondUp(const AgentMetrics& agent) {
 double RecordingSeconds(const ReportMetrics& metrics, int32_t agent_id, int64_t utime) {
   for (const AgentMetrics& agent : metrics.agents) {
     if (const auto span = agent.id == agent_id ? OdometrySpan(agent) : std::nullopt) {
-      return 1e-6 * static_cast<double>(utime - span->begin) + agent.initialised_s.value_or(0);
+      return agent.run.start_s + agent.initialised_s.value_or(0) +
+             1e-6 * static_cast<double>(utime - span->begin);
     }
   }
   return 0;
