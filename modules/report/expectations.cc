@@ -34,17 +34,34 @@ std::set<int32_t> Agents(const ordered_json& group) {
   return group.at("agents").get<std::set<int32_t>>();
 }
 
-// The time of the first fusion of all agents after which none has left the group.
+// Whether one group has maps of all these agents. `group_of`: by map, "AGENT/OPENED".
+bool Together(const std::map<std::string, size_t>& group_of, const std::set<int32_t>& agents) {
+  std::map<size_t, std::set<int32_t>> groups;
+  for (const auto& [map, group] : group_of) {
+    groups[group].insert(std::stoi(map));
+  }
+  return std::ranges::any_of(groups,
+                             [&agents](const auto& group) { return group.second == agents; });
+}
+
+// The time of the first fusion of all agents after which none has left the group. A map may leave
+// it, if its agent has another one there.
 Values FusedBy(const ordered_json& report) {
   std::set<int32_t> all;
   for (const ordered_json& agent : report.at("agents")) {
     all.insert(agent.at("id").get<int32_t>());
   }
   std::optional<double> since;
+  std::map<std::string, size_t> group_of;
+  size_t group = 0;
   for (const ordered_json& change : report.at("fused_at")) {
-    if (change.at("change") != "fused") {
+    ++group;
+    for (const ordered_json& map : change.at("map_ids")) {
+      group_of[map.get<std::string>()] = group;
+    }
+    if (!Together(group_of, all)) {
       since.reset();
-    } else if (!since && Agents(change) == all) {
+    } else if (!since) {
       since = Number(change.at("session_s"));
     }
   }

@@ -28,11 +28,12 @@ ordered_json Report() {
         {"id": 3, "error_m": 0.02, "error_px": 4, "largest_jump_m": 0.001}]},
       {"name": "pot", "agents": [{"id": 1, "error_m": 0.015, "error_px": 2, "largest_jump_m": 0}]}],
     "fused_at": [
-      {"change": "fused", "session_s": 10.5, "agents": [2]},
-      {"change": "fused", "session_s": 20.5, "agents": [1, 2]},
-      {"change": "taken apart", "session_s": 25.5, "agents": [1]},
-      {"change": "fused", "session_s": 30.5, "agents": [1, 2]},
-      {"change": "fused", "session_s": 40.5, "agents": [1, 2]}]})");
+      {"change": "fused", "session_s": 10.5, "agents": [2], "map_ids": ["2/10", "2/20"]},
+      {"change": "fused", "session_s": 20.5, "agents": [1, 2], "map_ids": ["1/10", "2/10", "2/20"]},
+      {"change": "taken apart", "session_s": 25.5, "agents": [1], "map_ids": ["1/10"]},
+      {"change": "fused", "session_s": 30.5, "agents": [1, 2], "map_ids": ["1/10", "2/10", "2/20"]},
+      {"change": "fused", "session_s": 40.5, "agents": [1, 2],
+       "map_ids": ["1/10", "1/20", "2/10", "2/20"]}]})");
 }
 
 CheckedExpectation Only(const Expectations& expectations, const ordered_json& report) {
@@ -66,6 +67,19 @@ TEST(Expectations, FusedIsForGood) {
   ordered_json apart = Report();
   apart["groups"] = {{{"agents", {1}}}, {{"agents", {2}}}};
   EXPECT_FALSE(Met("fused_by", 1000, apart));
+}
+
+// The report has one change for a split, of either part.
+TEST(Expectations, AMapMayLeaveWhileItsAgentStays) {
+  for (const char* left : {R"({"agents": [2], "map_ids": ["2/20"]})",
+                           R"({"agents": [1, 2], "map_ids": ["1/10", "2/10"]})"}) {
+    ordered_json report = Report();
+    ordered_json split = ordered_json::parse(left);
+    split["change"] = "taken apart";
+    split["session_s"] = 50.5;
+    report["fused_at"].push_back(split);
+    EXPECT_TRUE(Met("fused_by", 30.5, report)) << left;
+  }
 }
 
 TEST(Expectations, AMetricThatIsNotThereMisses) {
