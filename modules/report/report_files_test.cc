@@ -133,6 +133,26 @@ TEST_F(ReportFilesTest, ASecondMapOfAnAgentHasFilesOfItsOwn) {
   EXPECT_THAT(markdown_, HasSubstr("| 1     | 2    |"));
 }
 
+TEST_F(ReportFilesTest, BytesOfAnUplinkThatWasStartedAgainAreAddedUp) {
+  LogBoth();
+  input_.agents[0].bus_log = folder_ + "/restarted.lcm";
+  {
+    LogWriter log(input_.agents[0].bus_log);
+    for (const int64_t bytes : {100'000, 400'000, 20'000, 50'000}) {
+      status_t status{};
+      status.process = "uplink_1";
+      status.counters = {{"bytes_up", bytes}, {"bytes_down", bytes / 1000}};
+      status.num_counters = 2;
+      log.Write(channels::Status(status.process), status);
+    }
+  }
+  input_.agents[0].bytes_up = 50'000;  // of the last start
+  input_.agents[0].bytes_down = 50;
+  const json agent = Report()["agents"][0];
+  EXPECT_EQ(agent["bytes_up"], 450'000);
+  EXPECT_EQ(agent["bytes_down"], 450);
+}
+
 TEST_F(ReportFilesTest, RubbishInTheLogIsCountedAndNamed) {
   LogBoth();
   const std::vector<uint8_t> rubbish{1, 2, 3};

@@ -145,12 +145,27 @@ void ChooseMain(const std::vector<GroupMetrics>& groups, const CapturedSession& 
   }
 }
 
-// The byte counts in the uplink's last status, if the session has not counted.
+// The sum of a count over all starts of its process, each of which counts from zero.
+std::optional<int64_t> TotalOf(const std::vector<ProcessSample>& samples,
+                               std::optional<int64_t> ProcessSample::*count) {
+  std::optional<int64_t> total;
+  int64_t before = 0;
+  for (const ProcessSample& sample : samples) {
+    if (const auto now = sample.*count) {
+      total = total.value_or(0) + (*now < before ? *now : *now - before);
+      before = *now;
+    }
+  }
+  return total;
+}
+
+// The session has counted only what the uplink's last start did.
 void CountBytes(AgentMetrics* agent) {
   const auto uplink = agent->samples.find(fmt::format("uplink_{}", agent->id));
-  if (uplink != agent->samples.end() && !agent->run.bytes_up) {
-    agent->run.bytes_up = uplink->second.back().bytes_up;
-    agent->run.bytes_down = uplink->second.back().bytes_down;
+  if (uplink != agent->samples.end()) {
+    AgentRun& run = agent->run;
+    run.bytes_up = std::max(run.bytes_up, TotalOf(uplink->second, &ProcessSample::bytes_up));
+    run.bytes_down = std::max(run.bytes_down, TotalOf(uplink->second, &ProcessSample::bytes_down));
   }
 }
 
