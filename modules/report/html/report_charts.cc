@@ -58,24 +58,23 @@ struct Bar {
   double y = 0;
   double from_s = 0;
   double to_s = 0;
-  size_t colour = 0;
+  MapId frame;  // the map whose frame it is in
   std::string name = {};
-  int32_t frame_agent = 0;  // the agent whose map frame it is in
 };
 
-void AddBar(const Bar& bar, double to_s, Plot* plot) {
+void AddBar(const Bar& bar, double to_s, const ReportMetrics& metrics, Plot* plot) {
   plot->lines.push_back({.name = fmt::format("{}, {:.1f} to {:.1f} s: in agent {}'s map frame",
-                                             bar.name, bar.from_s, to_s, bar.frame_agent),
-                         .colour = AgentColour(bar.colour),
+                                             bar.name, bar.from_s, to_s, bar.frame.agent_id),
+                         .colour = AgentColour(metrics.IndexOf(bar.frame.agent_id)),
                          .width = 14,
                          .points = {{bar.from_s, bar.y}, {to_s, bar.y}}});
 }
 
-std::map<MapId, Bar> Bars(const CapturedSession& session, const ReportMetrics& metrics) {
+std::map<MapId, Bar> Bars(const CapturedSession& session) {
   std::map<MapId, Bar> bars;
   for (const auto& [id, keyframe] : session.keyframes) {
-    const auto [bar, is_new] = bars.try_emplace(
-        id.map, Bar{0, keyframe.session_s, keyframe.session_s, metrics.IndexOf(id.map.agent_id)});
+    const auto [bar, is_new] =
+        bars.try_emplace(id.map, Bar{0, keyframe.session_s, keyframe.session_s, id.map});
     bar->second.from_s = std::min(bar->second.from_s, keyframe.session_s);
     bar->second.to_s = std::max(bar->second.to_s, keyframe.session_s);
   }
@@ -91,13 +90,12 @@ std::map<MapId, Bar> Bars(const CapturedSession& session, const ReportMetrics& m
 Plot FusionChart(const CapturedSession& session, const ReportMetrics& metrics) {
   Plot plot = Chart("which maps were one", "");
   plot.y_from_zero = false;
-  std::map<MapId, Bar> bars = Bars(session, metrics);
+  std::map<MapId, Bar> bars = Bars(session);
   std::map<int32_t, int> maps_of_agent;
   for (auto& [map, bar] : bars) {
     const int nth = ++maps_of_agent[map.agent_id];
     bar.name = nth == 1 ? fmt::format("agent {}", map.agent_id)
                         : fmt::format("agent {}, map {}", map.agent_id, nth);
-    bar.frame_agent = map.agent_id;
     plot.y_names.push_back(bar.name);
   }
   std::ranges::reverse(plot.y_names);
@@ -107,15 +105,13 @@ Plot FusionChart(const CapturedSession& session, const ReportMetrics& metrics) {
     const auto frame = bars.find(change.frame);
     for (const MapId& map : change.maps) {
       const auto bar = bars.find(map);
-      const size_t colour = metrics.IndexOf(change.frame.agent_id);
-      if (bar == bars.end() || frame == bars.end() || bar->second.colour == colour) {
+      if (bar == bars.end() || frame == bars.end() || bar->second.frame == change.frame) {
         continue;
       }
-      AddBar(bar->second, change.session_s, &plot);
+      AddBar(bar->second, change.session_s, metrics, &plot);
       bar->second.from_s = change.session_s;
       bar->second.to_s = std::max(bar->second.to_s, change.session_s);
-      bar->second.colour = colour;
-      bar->second.frame_agent = change.frame.agent_id;
+      bar->second.frame = change.frame;
       joints.push_back(
           {.colour = "#555555",
            .width = 1.5,
@@ -123,7 +119,7 @@ Plot FusionChart(const CapturedSession& session, const ReportMetrics& metrics) {
     }
   }
   for (const auto& [map, bar] : bars) {
-    AddBar(bar, bar.to_s, &plot);
+    AddBar(bar, bar.to_s, metrics, &plot);
   }
   plot.lines.insert(plot.lines.end(), joints.begin(), joints.end());
   return plot;

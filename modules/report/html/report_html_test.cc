@@ -160,6 +160,18 @@ TEST(ReportCharts, AMapTakesTheColourOfItsGroup) {
   EXPECT_EQ(plot.lines[2].points.back(), Eigen::Vector2d(12, 1));
 }
 
+TEST(ReportCharts, TwoMapsOfOneAgentBecomeOneToo) {
+  CapturedSession session = SessionOfTwoMaps();
+  session.keyframes[{{1, 9}, 0}].session_s = 6;
+  session.changes.push_back({true, 8.0, 1, {1, 5}, {{1, 5}, {1, 9}}, {}});
+  const Plot plot = FusionChart(session, MetricsOfTwoAgents());
+  EXPECT_THAT(plot.y_names, ElementsAre("agent 2", "agent 1, map 2", "agent 1"));
+  ASSERT_EQ(plot.lines.size(), 5U) << "the second map before, all three, and what joins two";
+  EXPECT_EQ(plot.lines[0].name, "agent 1, map 2, 6.0 to 8.0 s: in agent 1's map frame");
+  EXPECT_EQ(plot.lines[4].points.front(), Eigen::Vector2d(8, 2));
+  EXPECT_EQ(plot.lines[4].points.back(), Eigen::Vector2d(8, 3));
+}
+
 TEST(ReportCharts, LoadIsCpuTimePerSecondAndARestartBreaksTheLine) {
   CapturedSession session = SessionOfTwoMaps();
   for (const auto& [utime, cpu_s] :
