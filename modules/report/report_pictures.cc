@@ -25,9 +25,12 @@ std::vector<Eigen::Vector3d> PointsOf(const CapturedSession& session, const Fina
                                       const MapId& map) {
   std::map<int32_t, PlyPoint> landmarks;
   std::vector<Eigen::Vector3d> points;
-  for (const FinalKeyframe& keyframe : group.keyframes) {
+  const auto first =
+      std::ranges::lower_bound(group.keyframes, KeyframeId{map, 0}, {}, &FinalKeyframe::id);
+  for (auto it = first; it != group.keyframes.end() && it->id.map == map; ++it) {
+    const FinalKeyframe& keyframe = *it;
     const auto captured = session.keyframes.find(keyframe.id);
-    if (keyframe.id.map != map || captured == session.keyframes.end()) {
+    if (captured == session.keyframes.end()) {
       continue;
     }
     for (const CapturedPoint& point : captured->second.points) {

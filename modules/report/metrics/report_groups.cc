@@ -13,10 +13,12 @@ using Poses = std::map<KeyframeId, FinalKeyframe>;
 // T_odom_body^-1 of their solved neighbour.
 void CarryOn(const CapturedSession& session, const MapId& map, Poses* poses) {
   std::map<int32_t, Rigid3> T_map_odom;  // by seq of a keyframe both solved and captured
-  for (const auto& [id, solved] : *poses) {
-    const auto captured = session.keyframes.find(id);
-    if (id.map == map && captured != session.keyframes.end()) {
-      T_map_odom[id.seq] = solved.T_map_body * captured->second.T_odom_body.Inverse();
+  for (auto solved = poses->lower_bound({map, 0});
+       solved != poses->end() && solved->first.map == map; ++solved) {
+    const auto captured = session.keyframes.find(solved->first);
+    if (captured != session.keyframes.end()) {
+      T_map_odom[solved->first.seq] =
+          solved->second.T_map_body * captured->second.T_odom_body.Inverse();
     }
   }
   if (T_map_odom.empty()) {
