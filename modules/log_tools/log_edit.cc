@@ -148,7 +148,6 @@ int64_t CutLog(const std::string& log, const LogCut& cut, const std::string& out
 int64_t MergeLogs(const std::vector<std::string>& logs, const std::string& out,
                   LogReadings* readings) {
   CheckNew(out);
-  LogFileWriter writer(out);
   std::vector<Place> places;
   for (size_t log = 0; log < logs.size(); ++log) {
     size_t event = 0;
@@ -165,6 +164,7 @@ int64_t MergeLogs(const std::vector<std::string>& logs, const std::string& out,
   for (const std::string& log : logs) {
     files.emplace_back(log);
   }
+  LogFileWriter writer(out);  // after all have been read: one that is no log leaves no file
   Progress progress("writing " + out);
   for (const Place& place : places) {
     progress.Update(writer.count(), std::ssize(places), "events");

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <map>
+#include <stdexcept>
 
 #include "bus/parse_message.h"
 #include "files/text_file.h"
@@ -68,10 +69,17 @@ class GraphBuilder {
 
 std::vector<std::string> ExportTum(const std::string& log, const std::string& folder,
                                    LogReadings* readings) {
+  const std::vector<FinalGroup> groups = FinalGroups(ReadServerLog(log, readings));
+  if (groups.empty()) {
+    throw std::runtime_error(fmt::format(
+        "{}: no KEYFRAME_* and no MAP_STATE in this log, so no trajectory; give that of a server's "
+        "bus: session.lcm, journal.lcm",
+        log));
+  }
   std::filesystem::create_directories(folder);
   std::vector<std::string> files;
   std::map<int32_t, int> of_agent;
-  for (const FinalGroup& group : FinalGroups(ReadServerLog(log, readings))) {
+  for (const FinalGroup& group : groups) {
     for (const int32_t agent : group.Agents()) {
       // Groups are sorted by number of agents, so the agent's first group is the largest.
       const std::string name = of_agent[agent]++ == 0

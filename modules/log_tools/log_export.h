@@ -13,7 +13,8 @@
 namespace pangea::session {
 
 // Writes the poses of each agent's keyframes in its group's map frame: <folder>/agent_<id>.tum, and
-// another file for each further group of the agent. Returns the files.
+// another file for each further group of the agent. Returns the files. Throws std::runtime_error if
+// there are none.
 std::vector<std::string> ExportTum(const std::string& log, const std::string& folder,
                                    LogReadings* readings = nullptr);
 // Writes the map points of the largest group, coloured by agent.

@@ -147,6 +147,19 @@ TEST_F(LogToolsTest, MergesByTimeAndKeepsEachLogsOrder) {
               testing::ElementsAre("10a", "12b", "18b", "20a", "15a", "20b"));
 }
 
+TEST_F(LogToolsTest, TrajectoriesOfALogWithoutKeyframesAreRefused) {
+  CutLog(kSample, {.channels = "CONSTRAINT"}, Path("constraints.lcm"));
+  EXPECT_THAT([this] { ExportTum(Path("constraints.lcm"), Path("tum")); },
+              testing::ThrowsMessage<std::runtime_error>(testing::HasSubstr("no KEYFRAME_*")));
+  EXPECT_FALSE(fs::exists(Path("tum")));
+}
+
+TEST_F(LogToolsTest, AMergeWithWhatIsNoLogLeavesNoFile) {
+  std::ofstream(Path("text")) << std::string(1000, 'x');
+  EXPECT_THROW(MergeLogs({kSample, Path("text")}, Path("both.lcm")), std::runtime_error);
+  EXPECT_FALSE(fs::exists(Path("both.lcm")));
+}
+
 TEST_F(LogToolsTest, CutsChannelsAndOverwritesNothing) {
   const int64_t events = CutLog(kSample, {.channels = "KEYFRAME_1"}, Path("one.lcm"));
   const LogSummary summary = Summarise(Path("one.lcm"));
