@@ -17,6 +17,29 @@ namespace pangea::site {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+// A failed export is removed: it would be in the way of the next one.
+class NewFolder {
+ public:
+  explicit NewFolder(const fs::path& path) : path_(path) { fs::create_directories(path); }
+  ~NewFolder() {
+    if (!is_complete_) {
+      std::error_code ignored;
+      fs::remove_all(path_, ignored);
+    }
+  }
+  NewFolder(const NewFolder&) = delete;
+  NewFolder& operator=(const NewFolder&) = delete;
+  void Keep() { is_complete_ = true; }
+
+ private:
+  const fs::path path_;
+  bool is_complete_ = false;
+};
+
+}  // namespace
+
 std::vector<std::string> ExportSite(const Site& site, const fs::path& out, LogReadings* readings) {
   if (!fs::exists(site.journal())) {
     throw std::runtime_error(
@@ -26,7 +49,7 @@ std::vector<std::string> ExportSite(const Site& site, const fs::path& out, LogRe
     throw std::runtime_error(
         fmt::format("--out {}: exists; give a new folder, nothing is overwritten", out.string()));
   }
-  fs::create_directories(out);
+  NewFolder folder(out);
   const fs::path replayed = out / "replay.lcm";
   const LoggedOptions logged = ReadLoggedOptions({site.journal()}, readings);
   {
@@ -45,6 +68,7 @@ std::vector<std::string> ExportSite(const Site& site, const fs::path& out, LogRe
     session::ExportGltf(replayed, anchors, files.back());
   }
   fs::remove(replayed);
+  folder.Keep();
   return files;
 }
 

@@ -40,5 +40,16 @@ TEST(SiteExport, HasTheAnchorsAmongThePoints) {
   EXPECT_FALSE(gltf["meshes"].empty()) << "the points";
 }
 
+TEST(SiteExport, LeavesNothingWhenItFails) {
+  const std::filesystem::path folder = FreshFolder("export_fails");
+  std::vector<StoredEvent> events = WalksOf({1});
+  std::erase_if(events,
+                [](const StoredEvent& event) { return event.channel.starts_with("KEYFRAME"); });
+  const Site site = MakeSite(folder / "hall", events);
+  LogReadings readings;
+  EXPECT_THROW(ExportSite(site, folder / "out", &readings), std::runtime_error);
+  EXPECT_FALSE(std::filesystem::exists(folder / "out"));
+}
+
 }  // namespace
 }  // namespace pangea::site
