@@ -31,21 +31,26 @@ void WritePng(const std::string& path, const cv::Mat& image) {
   }
 }
 
-EurocWriter::EurocWriter(const std::string& folder) : mav0_((fs::path(folder) / "mav0").string()) {
-  if (fs::exists(mav0_)) {
+EurocWriter::EurocWriter(const std::string& folder)
+    : complete_((fs::path(folder) / "mav0").string()), mav0_(complete_ + ".partial") {
+  if (fs::exists(complete_)) {
     throw std::runtime_error(
-        fmt::format("{}: holds a recording already; name another --out or remove it", mav0_));
+        fmt::format("{}: holds a recording already; name another --out or remove it", complete_));
   }
+  fs::remove_all(mav0_);  // of a run that was interrupted
   for (const char* name : {"cam0/data", "imu0", "state_groundtruth_estimate0"}) {
     fs::create_directories(fs::path(mav0_) / name);
   }
 }
 
-EurocWriter EurocWriter::Existing(const std::string& folder) {
+EurocWriter EurocWriter::Begun(const std::string& folder) {
   EurocWriter writer;
-  writer.mav0_ = (fs::path(folder) / "mav0").string();
+  writer.complete_ = (fs::path(folder) / "mav0").string();
+  writer.mav0_ = writer.complete_ + ".partial";
   return writer;
 }
+
+void EurocWriter::Finish() const { fs::rename(mav0_, complete_); }
 
 void EurocWriter::WriteText(const std::string& file, const std::string& text) const {
   WriteTextFile(mav0_ + "/" + file, text);

@@ -1,6 +1,7 @@
 #pragma once
 
-// Writes a recording in EuRoC's on-disk format: the sensors' folders, yaml and csv files.
+// Writes a recording in EuRoC's on-disk format: the sensors' folders, yaml and csv files. It has
+// another name until it is complete: half a recording would be played like a whole one.
 
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
@@ -19,12 +20,13 @@ class EurocWriter {
       "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],"
       "a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]\n";
 
-  // Creates `folder`/mav0 and its subfolders. Throws if it contains a recording already.
+  // Begins a recording in `folder`. Throws if it contains a recording already.
   explicit EurocWriter(const std::string& folder);
-  // Continues a recording that was created before.
-  static EurocWriter Existing(const std::string& folder);
+  // Continues a recording that was begun.
+  static EurocWriter Begun(const std::string& folder);
+  // The recording is complete: it becomes `folder`/mav0.
+  void Finish() const;
 
-  const std::string& mav0() const { return mav0_; }
   void WriteBody(const std::string& comment) const;
   void WriteCamera(const CameraModel& camera, double rate_hz, const std::string& comment) const;
   void WriteImuCalibration(const ImuNoise& noise) const;
@@ -39,7 +41,8 @@ class EurocWriter {
 
  private:
   EurocWriter() = default;
-  std::string mav0_;
+  std::string complete_;
+  std::string mav0_;  // where it is written
 };
 
 // 8-bit PNG with the fastest compression; throws if it cannot be written.

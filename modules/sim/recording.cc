@@ -212,7 +212,7 @@ cv::Mat Recorder::NoiseFreeFrame(int64_t stamp_ns) {
 }
 
 void Recorder::WriteImages(const Progress& progress) {
-  const EurocWriter writer = EurocWriter::Existing(options_.out);
+  const EurocWriter writer = EurocWriter::Begun(options_.out);
   const std::vector<int64_t>& stamps = schedule_.images_ns;
   std::atomic<size_t> next = 0;
   std::mutex mutex;
@@ -281,7 +281,7 @@ void Recorder::WriteTracks() const {
                           point.pixel.y());
     }
   }
-  EurocWriter::Existing(options_.out).WriteText("cam0/tracks.csv", text);
+  EurocWriter::Begun(options_.out).WriteText("cam0/tracks.csv", text);
 }
 
 RecordingSummary Recorder::Run(const Progress& progress) {
@@ -291,6 +291,7 @@ RecordingSummary Recorder::Run(const Progress& progress) {
     WriteTracks();
   }
   WriteImages(progress);
+  EurocWriter::Begun(options_.out).Finish();
   summary_.images = schedule_.images_ns.size();
   summary_.rendered = rendered_;
   Eigen::Vector3d previous = path_->At(schedule_.imu.begin_ns).T_ref_body.t;

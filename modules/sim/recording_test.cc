@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <stdexcept>
 
 #include "recording/euroc.h"
 #include "recording/trajectory.h"
@@ -68,6 +69,34 @@ TEST_F(Recording, IsReadAsEuRoCWithoutAWarning) {
   EXPECT_LT(recording.camera().T_body_cam.Minus(options.camera.T_body_cam).norm(), 1e-9);
   std::string why;
   EXPECT_FALSE(recording.LoadImage(0, &why).empty()) << why;
+}
+
+TEST_F(Recording, IsNoneUntilItIsComplete) {
+  const RecordingOptions options = Small("a");
+  const auto interrupt = [](size_t done, size_t) {
+    if (done == 4) {
+      throw std::runtime_error("interrupted");
+    }
+  };
+  EXPECT_THROW(RenderRecording(options, interrupt), std::runtime_error);
+  EXPECT_FALSE(fs::exists(options.out + "/mav0"));
+  RenderRecording(options);
+  EXPECT_EQ(EurocRecording(options.out).images().size(), 10u);
+  EXPECT_FALSE(fs::exists(options.out + "/mav0.partial"));
+  EXPECT_THROW(RenderRecording(options), std::runtime_error) << "it is there already";
+}
+
+TEST_F(Recording, WithoutAnImageIsRefused) {
+  RecordingOptions options = Small("a");
+  options.duration_s = 0.005;
+  EXPECT_THROW(RenderRecording(options), std::runtime_error);
+  EXPECT_FALSE(fs::exists(options.out));
+}
+
+TEST_F(Recording, NeedsNoCacheThatCannotBeMade) {
+  RecordingOptions options = Small("a");
+  options.cache_dir = "/proc/cache";
+  EXPECT_EQ(RenderRecording(options).rendered, 10u);
 }
 
 TEST_F(Recording, SameSeedSameBytesOnAnyThreadsWithAndWithoutCache) {

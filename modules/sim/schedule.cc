@@ -19,6 +19,10 @@ Schedule MakeSchedule(const Span& span, double imu_rate_hz, double image_rate_hz
   for (int64_t t = span.begin_ns + period; t + period <= span.end_ns; t += every * period) {
     schedule.images_ns.push_back(t);
   }
+  if (schedule.images_ns.empty()) {
+    throw std::runtime_error(fmt::format("nothing to record: {:.3f} s are too short for an image",
+                                         1e-9 * static_cast<double>(span.end_ns - span.begin_ns)));
+  }
   return schedule;
 }
 

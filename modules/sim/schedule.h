@@ -19,6 +19,7 @@ struct Schedule {
 };
 
 // Every image has the stamp of an IMU sample, as in EuRoC, with a sample before and after it.
+// Throws std::runtime_error if the span is too short for an image.
 Schedule MakeSchedule(const Span& span, double imu_rate_hz, double image_rate_hz);
 
 // A recorded IMU, with the rows of its file unchanged.

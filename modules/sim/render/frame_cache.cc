@@ -16,7 +16,11 @@ namespace fs = std::filesystem;
 FrameCache::FrameCache(const std::string& root, uint64_t key) {
   if (!root.empty()) {
     folder_ = fmt::format("{}/{:016x}", root, key);
-    fs::create_directories(folder_);
+    std::error_code error;
+    fs::create_directories(folder_, error);
+    if (error) {
+      folder_.clear();
+    }
   }
 }
 

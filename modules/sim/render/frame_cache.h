@@ -11,7 +11,7 @@ namespace pangea::sim {
 
 class FrameCache {
  public:
-  // If `root` is empty, nothing is cached.
+  // If `root` is empty, or no folder can be made there, nothing is cached.
   FrameCache(const std::string& root, uint64_t key);
 
   // Empty if the frame is not cached, or not as it was stored.
