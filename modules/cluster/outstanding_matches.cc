@@ -17,6 +17,8 @@ constexpr int64_t kMaxAsk_us = 60'000'000;
 
 void OutstandingMatches::Add(PlaceMatch match, std::string ack_subject, int64_t now_us) {
   const KeyframeId query = match.query;
+  // Results that another worker has stored since the match was added before.
+  std::erase_if(lacking_, [&query](const auto& lacking) { return lacking.second == query; });
   for (const PlaceCandidate& candidate : match.candidates) {
     lacking_.emplace(ConstraintId(query, candidate), query);
   }

@@ -75,5 +75,19 @@ TEST(OutstandingMatches, TheSameMatchAgainHasTheNewerAckSubject) {
   EXPECT_THAT(outstanding.AckSubjects(), IsEmpty());
 }
 
+// Another worker, which then fell silent, had stored one of its results.
+TEST(OutstandingMatches, TheSameMatchAgainLacksOnlyWhatItLacksNow) {
+  OutstandingMatches outstanding;
+  const PlaceMatch before = Match(10, 2);
+  PlaceMatch now = before;
+  now.candidates.erase(now.candidates.begin());
+  outstanding.Add(before, "old", 0);
+  outstanding.Add(now, "new", kSecond_us);
+  EXPECT_EQ(outstanding.num_lacking(), 1u);
+  EXPECT_EQ(outstanding.NoteStored(Id(before, 1)), "new");
+  EXPECT_FALSE(outstanding.NoteStored(Id(before, 0))) << "read from the stream afterwards";
+  EXPECT_EQ(outstanding.num_lacking(), 0u);
+}
+
 }  // namespace
 }  // namespace pangea
