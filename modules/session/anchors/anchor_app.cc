@@ -18,6 +18,20 @@
 namespace pangea::session {
 namespace {
 
+// The agent would place it in another image, or never.
+void CheckPlayed(const AnchorScript& anchor, const AgentScript& agent) {
+  const double end_s = agent.start_s + agent.duration_s;
+  if (agent.live || !agent.keyframes.empty()) {
+    return;  // its recording is not what is played
+  }
+  if (anchor.at_s < agent.start_s || (agent.duration_s > 0 && anchor.at_s > end_s)) {
+    throw std::runtime_error(
+        fmt::format("anchors: {}: 'at' is {:g} s, and agent {} plays its recording from {:g} s {}",
+                    anchor.name, anchor.at_s, agent.id, agent.start_s,
+                    agent.duration_s > 0 ? fmt::format("to {:g} s", end_s) : "on"));
+  }
+}
+
 PlannedAnchor Plan(const AnchorScript& anchor, const EurocRecording& recording) {
   const std::vector<EurocImage>& images = recording.images();
   const double end_s = 1e-6 * static_cast<double>(images.back().utime - images.front().utime);
@@ -43,9 +57,10 @@ std::vector<PlannedAnchor> PlanAnchors(const SessionScript& script) {
   std::map<int32_t, std::unique_ptr<EurocRecording>> recordings;
   std::vector<PlannedAnchor> planned;
   for (const AnchorScript& anchor : script.anchors) {
+    const auto agent = std::ranges::find(script.agents, anchor.agent, &AgentScript::id);
+    CheckPlayed(anchor, *agent);
     std::unique_ptr<EurocRecording>& recording = recordings[anchor.agent];
     if (!recording) {
-      const auto agent = std::ranges::find(script.agents, anchor.agent, &AgentScript::id);
       recording = std::make_unique<EurocRecording>(agent->resolved.string());
     }
     planned.push_back(Plan(anchor, *recording));

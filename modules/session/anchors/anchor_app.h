@@ -14,7 +14,8 @@
 namespace pangea::session {
 
 // Assigns to each anchor the image of the agent's recording nearest to its time. Throws
-// std::runtime_error if a recording cannot be read, is over by then, or has no such pixel.
+// std::runtime_error if a recording cannot be read, is over or not played then, or has no such
+// pixel.
 std::vector<PlannedAnchor> PlanAnchors(const SessionScript& script);
 
 class AnchorApp {

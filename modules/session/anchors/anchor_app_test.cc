@@ -90,6 +90,32 @@ TEST(PlanAnchors, RefusesWhatTheRecordingDoesNotShow) {
               HasSubstr("'pixel' [70, 1] is outside the images of agent 2: 64 x 48"));
 }
 
+TEST(PlanAnchors, RefusesATimeThatIsNotPlayed) {
+  SessionScript script = Script(1, {1, 1});
+  AgentScript& agent = script.agents[0];
+  const auto complaint = [&script] {
+    try {
+      PlanAnchors(script);
+    } catch (const std::runtime_error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  agent.start_s = 1.5;
+  EXPECT_EQ(complaint(),
+            "anchors: kettle: 'at' is 1 s, and agent 2 plays its recording from 1.5 s on");
+  agent.start_s = 0.25;
+  agent.duration_s = 0.5;
+  EXPECT_EQ(complaint(),
+            "anchors: kettle: 'at' is 1 s, and agent 2 plays its recording from 0.25 s to 0.75 s");
+  agent.duration_s = 1;
+  EXPECT_EQ(complaint(), "");
+  agent.live = true;
+  agent.start_s = 0;
+  agent.duration_s = 0.5;
+  EXPECT_EQ(complaint(), "") << "its duration is not the recording's";
+}
+
 class AnchorAppTest : public ::testing::Test {
  protected:
   AnchorAppTest() : app_({{{2, 1, "kettle", {3, 4}, ""}, kStart}}) {
