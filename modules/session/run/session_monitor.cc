@@ -106,9 +106,24 @@ void SessionMonitor::OnCorrection(int32_t agent_id, Bytes data) {
     return;
   }
   Drift& drift = drifts_[correction.value->map];
-  if (drift.Take(*correction.value)) {
-    agents_[agent_id].drift_m = drift.Moved(T_odom_body_[agent_id].t);
+  const auto pose = poses_.find(agent_id);
+  if (drift.Take(*correction.value) && pose != poses_.end() &&
+      pose->second.map == correction.value->map) {
+    agents_[agent_id].drift_m = drift.Moved(pose->second.T_odom_body.t);
   }
+}
+
+void SessionMonitor::NotePose(int32_t agent_id, const map_id_t& map, const rigid3_t& T_odom_body) {
+  const auto parsed_map = Parse(map);
+  const auto parsed_T = Parse(T_odom_body);
+  if (!parsed_map.value || !parsed_T.value) {
+    return;
+  }
+  const auto [pose, is_first] = poses_.try_emplace(agent_id);
+  if (pose->second.map != *parsed_map.value) {
+    agents_[agent_id].drift_m = 0;  // no correction of the new map has come yet
+  }
+  pose->second = {*parsed_map.value, *parsed_T.value};
 }
 
 void SessionMonitor::OnPose(int32_t agent_id, Bytes data) {
@@ -121,8 +136,8 @@ void SessionMonitor::OnPose(int32_t agent_id, Bytes data) {
   NoteTime(message.utime, &progress);
   progress.tracking = message.state == pose_t::STATE_TRACKING;
   progress.reason = message.reason;
-  if (const auto T = Parse(message.T_odom_body); progress.tracking && T.value) {
-    T_odom_body_[agent_id] = *T.value;
+  if (progress.tracking) {
+    NotePose(agent_id, message.map, message.T_odom_body);
   }
 }
 
@@ -135,9 +150,7 @@ void SessionMonitor::OnKeyframe(int32_t agent_id, Bytes data) {
   AgentProgress& progress = agents_[agent_id];
   NoteTime(message.utime, &progress);
   progress.tracking = true;
-  if (const auto T = Parse(message.T_odom_body); T.value) {
-    T_odom_body_[agent_id] = *T.value;
-  }
+  NotePose(agent_id, message.id.map, message.T_odom_body);
 }
 
 void SessionMonitor::OnStatus(Bytes data) {

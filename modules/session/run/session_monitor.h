@@ -13,6 +13,8 @@
 
 #include "bus/bus.h"
 #include "core/drift.h"
+#include "pangea/map_id_t.hpp"
+#include "pangea/rigid3_t.hpp"
 #include "pangea/status_t.hpp"
 #include "session/processes/buses.h"
 
@@ -66,11 +68,16 @@ class SessionMonitor {
   void OnKeyframe(int32_t agent_id, Bytes data);
   void OnStatus(Bytes data);
 
+  void NotePose(int32_t agent_id, const map_id_t& map, const rigid3_t& T_odom_body);
   std::vector<std::unique_ptr<LcmBus>> buses_;
   std::map<int32_t, Bus*> agent_buses_;
   std::map<int32_t, AgentProgress> agents_;
-  std::map<int32_t, Rigid3> T_odom_body_;  // newest pose of each agent
-  std::set<int32_t> with_odometry_;        // agents that publish poses
+  struct NewestPose {
+    MapId map;
+    Rigid3 T_odom_body;
+  };
+  std::map<int32_t, NewestPose> poses_;  // by agent
+  std::set<int32_t> with_odometry_;      // agents that publish poses
   std::map<MapId, Drift> drifts_;
   std::map<MapId, std::pair<int64_t, std::vector<MapId>>>
       groups_;  // revision and maps, by each map

@@ -1,0 +1,67 @@
+// Tests the progress that a session shows, from messages on real buses.
+
+#include "session/run/session_monitor.h"
+
+#include <gtest/gtest.h>
+
+#include "messages/channels.h"
+#include "messages/messages.h"
+#include "pangea/pose_t.hpp"
+
+namespace pangea::session {
+namespace {
+
+const MapId kFirst{2, 100}, kSecond{2, 200};
+
+class SessionMonitorTest : public ::testing::Test {
+ protected:
+  template <typename Message>
+  void Publish(const std::string& channel, const Message& message) {
+    agent_bus_.Publish(channel, EncodeMessage(message));
+    for (int i = 0; i < 20; ++i) {
+      monitor_.Handle(5);
+    }
+  }
+  void PublishPose(const MapId& map, double x) {
+    pose_t pose{};
+    pose.utime = ++utime_;
+    pose.state = pose_t::STATE_TRACKING;
+    pose.map = ToMessage(map);
+    pose.T_odom_body = ToMessage(Rigid3(Eigen::Quaterniond::Identity(), {x, 0, 0}));
+    pose.T_map_body = pose.T_odom_body;
+    Publish(channels::Pose(2), pose);
+  }
+  void PublishCorrection(const MapId& map, int64_t revision, double yaw) {
+    Correction correction;
+    correction.map = map;
+    correction.group = {1, 50};
+    correction.revision = revision;
+    correction.T_map_odom.q = YawRotation(yaw);
+    Publish(channels::Correction(2), ToMessage(correction));
+  }
+  double drift_m() const { return monitor_.agent(2).drift_m; }
+
+  const Buses buses_ = ChooseBuses({2}, {}, std::nullopt);
+  SessionMonitor monitor_{buses_};
+  LcmBus agent_bus_{buses_.agents.at(2)};
+  int64_t utime_ = 1'400'000'000'000'000;
+};
+
+// Maps of the agent that it has left are corrected too.
+TEST_F(SessionMonitorTest, TheDriftIsThatOfTheMapTheAgentIsIn) {
+  PublishPose(kFirst, 10);
+  PublishCorrection(kFirst, 1, 0.5);
+  EXPECT_EQ(drift_m(), 0) << "where it joined its group";
+  PublishCorrection(kFirst, 2, 0.6);
+  EXPECT_NEAR(drift_m(), 1, 0.01);
+  PublishPose(kSecond, 50);
+  EXPECT_EQ(drift_m(), 0);
+  PublishCorrection(kFirst, 3, 0.7);
+  EXPECT_EQ(drift_m(), 0) << "of the other map";
+  PublishCorrection(kSecond, 3, 0);
+  PublishCorrection(kSecond, 4, 0.02);
+  EXPECT_NEAR(drift_m(), 1, 0.01);
+}
+
+}  // namespace
+}  // namespace pangea::session
