@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 
 #include "bus/node.h"
 #include "server_options/server_options.h"
@@ -41,10 +42,27 @@ AgentRun RunOf(const AgentScript& script) {
   run.id = script.id;
   run.recording = script.resolved.string();
   run.start_s = script.start_s;
-  if (script.duration_s > 0) {
+  if (script.duration_s > 0 && !script.live) {  // a live agent's is not of its recording
     run.duration_s = script.duration_s;
   }
   return run;
+}
+
+// Session time in which an agent played. Recordings may be played at once, or one after another.
+double PlayedSeconds(const SessionScript& script, const RunSummary& summary) {
+  std::map<double, double> spans;  // end by begin
+  for (const AgentScript& agent : script.agents) {
+    if (const auto played = summary.played_s.find(agent.id); played != summary.played_s.end()) {
+      double& end_s = spans[agent.delay_s];
+      end_s = std::max(end_s, agent.delay_s + played->second);
+    }
+  }
+  double seconds = 0, until_s = 0;
+  for (const auto& [begin_s, end_s] : spans) {
+    seconds += std::max(0.0, end_s - std::max(begin_s, until_s));
+    until_s = std::max(until_s, end_s);
+  }
+  return seconds;
 }
 
 std::vector<WantedAnchor> WantedAnchors(const SessionScript& script) {
@@ -97,7 +115,6 @@ ReportOutcome ReportRun(const SessionScript& script, const RunSummary& summary, 
                         LogReadings* readings) {
   ReportInput input;
   input.server_log = (out / "session.lcm").string();
-  double recorded_s = 0;
   for (const AgentScript& agent : script.agents) {
     AgentRun run = RunOf(agent);
     run.bus_log = (out / fmt::format("agent_{}.lcm", agent.id)).string();
@@ -111,15 +128,15 @@ ReportOutcome ReportRun(const SessionScript& script, const RunSummary& summary, 
     const auto wall = summary.vio_wall_s.find(agent.id);
     if (played != summary.played_s.end() && wall != summary.vio_wall_s.end() && wall->second > 0) {
       run.realtime_factor = played->second / wall->second;
-      recorded_s = std::max(recorded_s, played->second);
     }
     input.agents.push_back(std::move(run));
   }
   // The largest possible real-time factor of a process: seconds of session per second of its CPU
   // time.
-  for (const auto& [name, status] : summary.status) {
-    if (status.cpu_s > 0 && recorded_s > 0) {
-      input.realtime_factors[name] = recorded_s / static_cast<double>(status.cpu_s);
+  const double played_s = PlayedSeconds(script, summary);
+  for (const auto& [name, cpu_s] : summary.cpu_s) {
+    if (cpu_s > 0 && played_s > 0) {
+      input.realtime_factors[name] = played_s / cpu_s;
     }
   }
   for (const std::string& name : summary.restarted) {

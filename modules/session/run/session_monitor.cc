@@ -165,7 +165,11 @@ void SessionMonitor::OnStatus(Bytes data) {
     }
   }
   status_received_[message.process] = WallUtime();
-  statuses_[message.process] = std::move(message);
+  status_t& status = statuses_[message.process];
+  if (message.cpu_s < status.cpu_s) {  // it was started again
+    cpu_before_s_[message.process] += static_cast<double>(status.cpu_s);
+  }
+  status = std::move(message);
 }
 
 void SessionMonitor::Handle(int timeout_ms) {
@@ -184,6 +188,14 @@ void SessionMonitor::Handle(int timeout_ms) {
 }
 
 const AgentProgress& SessionMonitor::agent(int32_t id) const { return agents_.at(id); }
+
+std::map<std::string, double> SessionMonitor::CpuSeconds() const {
+  std::map<std::string, double> cpu_s = cpu_before_s_;
+  for (const auto& [name, status] : statuses_) {
+    cpu_s[name] += static_cast<double>(status.cpu_s);
+  }
+  return cpu_s;
+}
 
 double SessionMonitor::QuietSeconds() const {
   return 1e-6 * static_cast<double>(WallUtime() - last_work_);

@@ -49,6 +49,8 @@ class SessionMonitor {
   Bus& agent_bus(int32_t id) { return *agent_buses_.at(id); }
   // Newest status of each process, by name, from any bus.
   const std::map<std::string, status_t>& statuses() const { return statuses_; }
+  // CPU time of each process, over all its starts.
+  std::map<std::string, double> CpuSeconds() const;
   int constraints_accepted() const { return accepted_; }
   int constraints_refused() const { return refused_; }
   int num_results() const { return accepted_ + refused_; }
@@ -66,9 +68,9 @@ class SessionMonitor {
   void OnCorrection(int32_t agent_id, Bytes data);
   void OnPose(int32_t agent_id, Bytes data);
   void OnKeyframe(int32_t agent_id, Bytes data);
+  void NotePose(int32_t agent_id, const map_id_t& map, const rigid3_t& T_odom_body);
   void OnStatus(Bytes data);
 
-  void NotePose(int32_t agent_id, const map_id_t& map, const rigid3_t& T_odom_body);
   std::vector<std::unique_ptr<LcmBus>> buses_;
   std::map<int32_t, Bus*> agent_buses_;
   std::map<int32_t, AgentProgress> agents_;
@@ -83,6 +85,7 @@ class SessionMonitor {
       groups_;  // revision and maps, by each map
   std::map<std::string, status_t> statuses_;
   std::map<std::string, int64_t> status_received_;  // wall clock
+  std::map<std::string, double> cpu_before_s_;      // of starts before the last one
   int64_t last_work_ = 0;                           // wall clock
   int accepted_ = 0;
   int refused_ = 0;

@@ -63,5 +63,15 @@ TEST_F(SessionMonitorTest, TheDriftIsThatOfTheMapTheAgentIsIn) {
   EXPECT_NEAR(drift_m(), 1, 0.01);
 }
 
+TEST_F(SessionMonitorTest, CpuTimeIsThatOfAllStartsOfAProcess) {
+  for (const float cpu_s : {1.0f, 4.0f, 0.5f, 2.0f}) {
+    status_t status{};
+    status.process = "fusion";
+    status.cpu_s = cpu_s;
+    Publish(channels::Status(status.process), status);
+  }
+  EXPECT_DOUBLE_EQ(monitor_.CpuSeconds().at("fusion"), 6);
+}
+
 }  // namespace
 }  // namespace pangea::session

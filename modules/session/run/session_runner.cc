@@ -71,6 +71,7 @@ class Runner {
     kept_.StopAll(kStopGrace_s);
     summary_.wall_s = Now() - begin_;
     summary_.status = monitor_.statuses();
+    summary_.cpu_s = monitor_.CpuSeconds();
     for (const Player& player : players_) {
       summary_.vio_wall_s[player.script.id] = player.ended_s - player.started_s;
       summary_.played_s[player.script.id] = monitor_.agent(player.script.id).recorded_s();
