@@ -122,5 +122,13 @@ TEST(TableText, ColumnsArePadded) {
             "|\n");
 }
 
+TEST(TableText, ABarOrALinesEndInATextEndsNoCell) {
+  Table table({"anchor"});
+  table.Add({"left | right\nof it"});
+  EXPECT_EQ(table.Text(),
+            "| anchor              |\n|---------------------|\n"
+            "| left \\| right of it |\n");
+}
+
 }  // namespace
 }  // namespace pangea

@@ -29,19 +29,30 @@ size_t SequenceAt(const std::string& text, size_t at) {
   return control ? 0 : length;
 }
 
+// A bar or the end of a line would end the cell.
+std::string Cell(const std::string& text) {
+  std::string cell;
+  for (const char c : text) {
+    cell += c == '|' ? "\\|" : std::string(1, c == '\n' ? ' ' : c);
+  }
+  return cell;
+}
+
 }  // namespace
 
 std::string Table::Text() const {
-  std::vector<size_t> widths(rows_.front().size(), 3);
-  for (const auto& row : rows_) {
+  std::vector<std::vector<std::string>> rows = rows_;
+  std::vector<size_t> widths(rows.front().size(), 3);
+  for (auto& row : rows) {
     for (size_t i = 0; i < row.size(); ++i) {
+      row[i] = Cell(row[i]);
       widths[i] = std::max(widths[i], row[i].size());
     }
   }
   std::string text;
-  for (size_t r = 0; r < rows_.size(); ++r) {
+  for (size_t r = 0; r < rows.size(); ++r) {
     for (size_t i = 0; i < widths.size(); ++i) {
-      text += fmt::format("| {:<{}} ", rows_[r][i], widths[i]);
+      text += fmt::format("| {:<{}} ", rows[r][i], widths[i]);
     }
     text += "|\n";
     for (size_t i = 0; r == 0 && i < widths.size(); ++i) {
