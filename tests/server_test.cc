@@ -174,6 +174,17 @@ TEST(Server, RefusesOptionsOfNoProcessAndOptionsThatAreNotThere) {
   EXPECT_THAT(outcome.output, HasSubstr("there is no file /not/there.yaml"));
   outcome = RunCommand(ServerCommand(folder) + " --options-dir /not/there");
   EXPECT_THAT(outcome.output, HasSubstr("there is no such folder"));
+  fs::create_directories(folder / "options");
+  for (const char* name : {"fushion.yaml", "posegraph.yml", "anchors.yaml", "thinning.yaml"}) {
+    std::ofstream(folder / "options" / name) << "{}\n";
+  }
+  outcome = RunCommand(ServerCommand(folder) + " --options-dir " + (folder / "options").string() +
+                       " --options fusion=/not/there.yaml");
+  EXPECT_THAT(outcome.output, HasSubstr("fushion.yaml: no process reads it; did you mean "
+                                        "'fusion.yaml'?"));
+  EXPECT_THAT(outcome.output, HasSubstr("posegraph.yml: no process reads it"));
+  EXPECT_THAT(outcome.output, Not(HasSubstr("anchors.yaml: no")));
+  EXPECT_THAT(outcome.output, Not(HasSubstr("thinning.yaml: no")));
 }
 
 }  // namespace

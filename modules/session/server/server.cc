@@ -6,12 +6,14 @@
 #include <chrono>
 #include <cstdio>
 #include <functional>
+#include <set>
 #include <stdexcept>
 #include <thread>
 #include <utility>
 #include <vector>
 
 #include "bus/process.h"
+#include "options/nearest_word.h"
 #include "session/processes/child_process.h"
 #include "session/processes/kept_processes.h"
 #include "session/server/checkpoints.h"
@@ -25,6 +27,7 @@ namespace fs = std::filesystem;
 constexpr double kServerStopGrace_s = 5;
 constexpr const char* kGateway = "gateway";
 constexpr const char* kBridge = "bridge";
+constexpr const char* kThinningOptions = "thinning.yaml";  // of pangea-site compact
 // Processes that workers run, and a server on several hosts does not.
 constexpr const char* kVerifiers[] = {"fusion", "inter_map_ba"};
 constexpr std::chrono::milliseconds kServerLookInterval{100};
@@ -111,6 +114,25 @@ void Start(KeptProcesses* kept, const std::string& process, const std::vector<st
   Say(fmt::format("started {}", fmt::join(argv, " ")));
 }
 
+// Names a file that looks like a process' options and is not read by one.
+void SayUnusedOptions(const fs::path& folder) {
+  std::vector<std::string> known;
+  for (const std::string process : kServerProcesses) {
+    known.push_back(process + ".yaml");
+  }
+  std::set<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    files.insert(entry.path());
+  }
+  for (const fs::path& file : files) {
+    const std::string name = file.filename();
+    const bool is_options = file.extension() == ".yaml" || file.extension() == ".yml";
+    if (is_options && name != kThinningOptions && std::ranges::find(known, name) == known.end()) {
+      Say(fmt::format("{}: no process reads it{}", file.string(), NearestWordHint(name, known)));
+    }
+  }
+}
+
 }  // namespace
 
 std::string ProgramOf(const std::string& process) {
@@ -147,6 +169,7 @@ void AddOptionsFolder(const fs::path& folder, ServerOptions* options) {
       options->options[process] = file;
     }
   }
+  SayUnusedOptions(folder);
 }
 
 int Serve(const ServerOptions& options) {

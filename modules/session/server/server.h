@@ -36,7 +36,7 @@ struct ServerOptions {
 
 // Parses "fusion=FILE" into `options`. Throws std::runtime_error with the correction.
 void AddProcessOptions(const std::string& text, ServerOptions* options);
-// Adds <process>.yaml of each process that has one in the folder.
+// Adds <process>.yaml of each process that has one in the folder; names other files on stdout.
 void AddOptionsFolder(const std::filesystem::path& folder, ServerOptions* options);
 
 // The path of a server process' program, in the same directory as this one. Throws
