@@ -30,7 +30,8 @@ ChildProcess::ChildProcess(std::string name, std::vector<std::string> argv,
   arguments.push_back(nullptr);
   const int out = open(output_.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
   if (out < 0) {
-    throw std::runtime_error(fmt::format("cannot write {}", output_.string()));
+    throw std::runtime_error(
+        fmt::format("{}: cannot be written: {}", output_.string(), std::strerror(errno)));
   }
   const pid_t parent = getpid();
   pid_ = fork();

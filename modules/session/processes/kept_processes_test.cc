@@ -91,7 +91,7 @@ TEST_F(KeptProcessesTest, OneWhoseLogCannotBeOpenedWaitsForIt) {
   while (revived.empty()) {
     revived = kept.Revive();
   }
-  EXPECT_THAT(revived.front().why, HasSubstr("cannot write"));
+  EXPECT_THAT(revived.front().why, HasSubstr("cannot be written: No such file"));
   EXPECT_FALSE(revived.front().given_up);
   for (int i = 0; i < 2 * KeptProcesses::kMaxRestarts; ++i) {
     EXPECT_TRUE(kept.Revive().empty()) << "it is told once";
