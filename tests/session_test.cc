@@ -142,6 +142,37 @@ TEST_F(SessionTest, ExpectationsAreReported) {
   }
 }
 
+// The keys of a server's agents, and its journal.
+TEST(SessionFolder, WhatIsOfNoSessionIsLeftAlone) {
+  const fs::path folder = FreshFolder("server_folder");
+  const fs::path session =
+      WriteSession(folder, {"id: 1, keyframes: " PANGEA_SOURCE_DIR "/logs/two_walks/session.lcm"});
+  for (const char* name : {"keys", "journal.lcm", "agent_1.lcm", "spool_1"}) {
+    const fs::path out = folder / "out";
+    fs::create_directories(out);
+    std::ofstream(out / name) << "mine";
+    const Outcome outcome =
+        RunCommand("pangea-session run " + session.string() + " --rate max --out " + out.string());
+    EXPECT_EQ(outcome.exit_code, 1) << outcome.output;
+    EXPECT_THAT(outcome.output, HasSubstr(std::string("'") + name + "' in it is of no session"));
+    EXPECT_EQ(ReadFile(out / name), "mine");
+    fs::remove_all(out);
+  }
+}
+
+// It wrote its recordings.json and keys, and lcm-logger was not there.
+TEST(SessionFolder, ASessionThatDidNotStartIsMovedAside) {
+  const fs::path out = FreshFolder("not_started") / "out";
+  fs::create_directories(out / "keys");
+  std::ofstream(out / "recordings.json") << R"({"agents": [], "anchors": [], "expect": {}})";
+  const Outcome outcome = RunCommand("pangea-session replay " PANGEA_SOURCE_DIR
+                                     "/logs/two_walks/session.lcm --until 4 --out " +
+                                     out.string());
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_TRUE(fs::exists(out.string() + ".1/keys"));
+  EXPECT_FALSE(fs::exists(out / "keys"));
+}
+
 TEST(SessionFolder, AnEarlierSessionIsMovedAside) {
   const fs::path out = FreshFolder("again") / "out";
   const std::string replay = "pangea-session replay " PANGEA_SOURCE_DIR
@@ -181,6 +212,8 @@ TEST(SessionMistakes, OfAReplayLeaveTheEarlierSession) {
   EXPECT_THAT(said(replay + log), HasSubstr("is given twice: give each log once"));
   const std::string agent_9 = "--recording 9=" PANGEA_SOURCE_DIR;
   EXPECT_THAT(said(replay + agent_9), HasSubstr("there are agents 1, 2"));
+  EXPECT_THAT(said(replay + "--diff " + (out / "session.lcm").string()),
+              HasSubstr("holds the log of --diff"));
   fs::remove(out / "session.lcm");
   const fs::path no_keyframes = out.parent_path() / "constraints.lcm";
   RunCommand("pangea-log cut " + log + "--channels CONSTRAINT --out " + no_keyframes.string());

@@ -58,6 +58,16 @@ struct RunArguments {
   int first_port = 0;
 };
 
+// The files and folders that a session begins, or continues where they are.
+std::vector<std::string> NamesOf(const SessionScript& script) {
+  std::vector<std::string> names{"keys", "journal.lcm"};
+  for (const AgentScript& agent : script.agents) {
+    names.push_back(fmt::format("agent_{}.lcm", agent.id));
+    names.push_back(fmt::format("spool_{}", agent.id));
+  }
+  return names;
+}
+
 int Run(const RunArguments& arguments, LogReadings* readings) {
   SessionScript script =
       ReadSessionFile(FindSessionFile(arguments.file), FolderOf(arguments.recordings));
@@ -72,6 +82,7 @@ int Run(const RunArguments& arguments, LogReadings* readings) {
   if (arguments.first_port != 0) {
     options.first_port = static_cast<uint16_t>(arguments.first_port);
   }
+  CheckNothingIsReplaced(options.out, NamesOf(script));
   const OutFolder out(options.out);
   WriteRecordings(script, options.out);
   const RunSummary summary = RunSession(script, options);
@@ -203,13 +214,23 @@ void ExplainInto(const fs::path& out, int64_t constraint, const SessionRecord& k
   std::cout << fmt::format("{}{}\n", ToText(explanation), picture.string());
 }
 
+bool IsIn(const fs::path& file, const fs::path& folder) {
+  return fs::exists(folder) && fs::equivalent(fs::absolute(file).parent_path(), folder);
+}
+
 int RunReplay(const ReplayArguments& arguments, LogReadings* readings) {
   const fs::path out(arguments.out);
   for (const std::string& log : arguments.logs) {
-    if (fs::exists(out) && fs::equivalent(fs::absolute(log).parent_path(), out)) {
+    if (IsIn(log, out)) {
       throw std::runtime_error(fmt::format(
           "--out {}: holds the log that is to be replayed; give another folder", arguments.out));
     }
+  }
+  if (!arguments.diff.empty() && IsIn(arguments.diff, out)) {
+    throw std::runtime_error(
+        fmt::format("--out {}: holds the log of --diff, which would be moved aside; give another "
+                    "folder",
+                    arguments.out));
   }
   if (!arguments.only.empty()) {
     return RunReplayOnly(arguments, readings);

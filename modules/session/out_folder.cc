@@ -12,11 +12,31 @@ namespace pangea::session {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+// recordings.json is written first: a session that could not start has left nothing else of note.
+bool HoldsSession(const fs::path& folder) {
+  return fs::exists(folder / "session.lcm") || fs::exists(folder / "recordings.json");
+}
+
+}  // namespace
+
+void CheckNothingIsReplaced(const fs::path& out, const std::vector<std::string>& names) {
+  for (const std::string& name : names) {
+    if (!HoldsSession(out) && fs::exists(out / name)) {
+      throw std::runtime_error(
+          fmt::format("--out {}: '{}' in it is of no session, and this one would use that name; "
+                      "give another folder",
+                      out.string(), name));
+    }
+  }
+}
+
 OutFolder::OutFolder(const fs::path& given) : folder_(WithoutSlash(given)) {
   if (fs::exists(folder_) && !fs::is_directory(folder_)) {
     throw std::runtime_error(fmt::format("--out {}: is a file, not a folder", given.string()));
   }
-  if (fs::exists(folder_ / "session.lcm")) {
+  if (HoldsSession(folder_)) {
     MoveAside(given);
   }
   MakeFolder(folder_);

@@ -4,8 +4,15 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
+#include <vector>
 
 namespace pangea::session {
+
+// Throws std::runtime_error if the folder has a file or folder of one of these names that is not of
+// an earlier session: keys and the journal of a server, for instance.
+void CheckNothingIsReplaced(const std::filesystem::path& out,
+                            const std::vector<std::string>& names);
 
 // An earlier session in the folder is moved aside, so nothing is lost. If the folder is still empty
 // at the end, the earlier session is moved back.
