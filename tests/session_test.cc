@@ -142,6 +142,27 @@ TEST_F(SessionTest, ExpectationsAreReported) {
   }
 }
 
+// A table's second half, for instance, is still only a half where its recording lies elsewhere.
+TEST_F(SessionTest, ARecordingThatWasMovedKeepsThePartThatWasPlayed) {
+  const fs::path moved = *folder_ / "moved";
+  fs::create_directories(moved);
+  for (const char* log : {"session.lcm", "agent_1.lcm"}) {
+    fs::create_hard_link(Out(log), moved / log);
+  }
+  auto record = ReadJson(Out("recordings.json"));
+  record["agents"][0]["start"] = 1;
+  record["agents"][0]["recording"] = "/not/there";
+  record["expect"] = nlohmann::json::object();
+  std::ofstream(moved / "recordings.json") << record;
+  const Outcome outcome = RunCommand("pangea-session report " + (moved / "session.lcm").string() +
+                                     " --recording 1=" + Walk(1).string() + " --out " +
+                                     (*folder_ / "moved_report").string());
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.output;
+  const auto reported = ReadJson(*folder_ / "moved_report" / "report.json");
+  EXPECT_NEAR(reported["agents"][0]["initialised_s"].get<double>(),
+              ReadJson(Out("report.json"))["agents"][0]["initialised_s"].get<double>() - 1, 1e-6);
+}
+
 // The keys of a server's agents, and its journal.
 TEST(SessionFolder, WhatIsOfNoSessionIsLeftAlone) {
   const fs::path folder = FreshFolder("server_folder");

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <stdexcept>
@@ -99,6 +100,15 @@ SessionRecord ReadSessionRecord(const std::vector<fs::path>& logs) {
     }
   }
   return session;
+}
+
+void GiveRecording(int32_t agent_id, const std::string& folder, SessionRecord* session) {
+  if (std::ranges::find(session->agents, agent_id, &AgentRun::id) == session->agents.end()) {
+    session->agents.emplace_back().id = agent_id;
+  }
+  for (AgentRun& agent : session->agents) {
+    agent.recording = agent.id == agent_id ? folder : agent.recording;
+  }
 }
 
 std::map<int32_t, std::string> RecordingsAtHand(const SessionRecord& session) {

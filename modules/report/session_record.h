@@ -32,6 +32,9 @@ SessionRecord ReadSessionRecord(const std::vector<std::filesystem::path>& logs);
 void KeepRecordings(const std::vector<std::filesystem::path>& logs,
                     const std::filesystem::path& out);
 
+// Sets the folder of an agent's recording; the part that was played stays as it is known.
+void GiveRecording(int32_t agent_id, const std::string& folder, SessionRecord* session);
+
 // Folders, by agent, of the recordings that still exist.
 std::map<int32_t, std::string> RecordingsAtHand(const SessionRecord& session);
 

@@ -110,11 +110,7 @@ SessionRecord KnownOf(const LogArguments& arguments, LogReadings* readings) {
     known.expect = ParseSessionFile(FindSessionFile(arguments.expect)).expect;
   }
   for (const auto& [id, folder] : RecordingsOf(arguments.recordings, arguments.logs, readings)) {
-    AgentRun run;
-    run.id = id;
-    run.recording = folder;
-    std::erase_if(known.agents, [&](const AgentRun& other) { return other.id == run.id; });
-    known.agents.push_back(run);
+    GiveRecording(id, folder, &known);
   }
   return known;
 }
