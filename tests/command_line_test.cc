@@ -105,6 +105,9 @@ TEST(Log, WhatIsNoLogIsNoEmptyLog) {
   const Outcome outcome = RunCommand("pangea-log info " + empty.string());
   EXPECT_GT(outcome.exit_code, 100) << outcome.output;
   EXPECT_THAT(outcome.output, HasSubstr("empty.lcm: is empty"));
+  const Outcome pipe = RunCommand("cat " + kSample + " | pangea-log info /dev/stdin");
+  EXPECT_EQ(pipe.exit_code, 1);
+  EXPECT_THAT(pipe.output, HasSubstr("pangea-log: /dev/stdin: "));
   const Outcome cost = RunCommand("pangea-log cost " + empty.string());
   EXPECT_EQ(cost.exit_code, 1);
   EXPECT_THAT(cost.output, HasSubstr("empty.lcm: has no VERTEX_SE3:QUAT"));

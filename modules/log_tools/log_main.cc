@@ -98,10 +98,12 @@ std::string IsJsonOrGltf(const std::string& path) {
              : fmt::format("{}: ends neither in .json nor in .gltf", path);
 }
 
-// The log's reader refuses a file that is not a log.
+// The log's reader refuses a file that is not a log, and a pipe, which has no size.
 std::string IsNotEmpty(const std::string& path) {
-  return std::filesystem::file_size(path) > 0 ? ""
-                                              : fmt::format("{}: is empty: no event in it", path);
+  std::error_code has_no_size;
+  return std::filesystem::file_size(path, has_no_size) > 0 || has_no_size
+             ? ""
+             : fmt::format("{}: is empty: no event in it", path);
 }
 
 CLI::App* AddCommand(CLI::App& app, const char* name, const char* what, Arguments* arguments,
