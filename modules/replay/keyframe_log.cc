@@ -47,6 +47,18 @@ void CheckGaps(const std::filesystem::path& log, const std::map<MapId, std::set<
             "have them: replay that."));
 }
 
+// The capture of a map's first keyframe relates the map's sensor clock to the log's time. After
+// that the sensor clock counts, because a capture may be delayed, or faster than real time.
+void SetElapsedBySensorClocks(std::vector<LoggedKeyframe>* log) {
+  const int64_t begin = log->front().captured_utime;
+  std::map<MapId, int64_t> begin_by_sensor;
+  for (LoggedKeyframe& keyframe : *log) {
+    const int64_t captured_us = keyframe.captured_utime - begin;
+    const auto known = begin_by_sensor.try_emplace(keyframe.id.map, keyframe.utime - captured_us);
+    keyframe.elapsed_us = keyframe.utime - known.first->second;
+  }
+}
+
 }  // namespace
 
 std::vector<LoggedKeyframe> ReadKeyframeLog(const std::filesystem::path& log,
@@ -110,26 +122,24 @@ std::vector<LoggedKeyframe> Interleave(std::vector<std::vector<LoggedKeyframe>> 
   if (logs.size() == 1) {
     return std::move(logs.front());
   }
+  for (std::vector<LoggedKeyframe>& log : logs) {
+    SetElapsedBySensorClocks(&log);
+  }
   std::vector<LoggedKeyframe> merged;
   std::vector<size_t> next(logs.size(), 0);
   while (true) {
     size_t best = logs.size();
-    int64_t best_elapsed = 0;
     for (size_t i = 0; i < logs.size(); ++i) {
-      if (next[i] < logs[i].size()) {
-        const int64_t elapsed = logs[i][next[i]].utime - logs[i].front().utime;
-        if (best == logs.size() || elapsed < best_elapsed) {
-          best = i;
-          best_elapsed = elapsed;
-        }
+      if (next[i] < logs[i].size() &&
+          (best == logs.size() ||
+           logs[i][next[i]].elapsed_us < logs[best][next[best]].elapsed_us)) {
+        best = i;
       }
     }
     if (best == logs.size()) {
       return merged;
     }
-    // Copy, not move: the log's first keyframe is needed as its time origin until the end.
-    merged.push_back(logs[best][next[best]++]);
-    merged.back().elapsed_us = best_elapsed;
+    merged.push_back(std::move(logs[best][next[best]++]));
   }
 }
 

@@ -32,9 +32,10 @@ std::vector<LoggedKeyframe> ReadKeyframeLog(const std::filesystem::path& log,
 std::vector<LoggedKeyframe> ReadKeyframeLogOf(const std::filesystem::path& log, int32_t agent_id,
                                               LogReadings* readings = nullptr);
 
-// Merges several logs as if they had started together: ordered by the time (sensor clock) since
-// each log's first keyframe, ties by the order of the logs; each log keeps its own order.
-// elapsed_us becomes that time; a single log is unchanged.
+// Merges several logs as if they had started together: ordered by the time since each log's first
+// keyframe, ties by the order of the logs; each log keeps its own order. The clock of this time is
+// the sensor's, and the capture's up to the first keyframe of each map: the agents of a log have
+// different sensor clocks. elapsed_us becomes that time; a single log is unchanged.
 std::vector<LoggedKeyframe> Interleave(std::vector<std::vector<LoggedKeyframe>> logs);
 
 }  // namespace pangea::session

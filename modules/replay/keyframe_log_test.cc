@@ -13,21 +13,37 @@ namespace {
 
 using testing::HasSubstr;
 
-// A log of keyframes of one map: (seq, utime).
-std::filesystem::path WriteLog(const std::string& name, int32_t agent,
-                               const std::vector<std::pair<int32_t, int64_t>>& keyframes) {
+struct Captured {
+  int32_t agent = 0;
+  int32_t seq = 0;
+  int64_t utime = 0;  // sensor clock
+  int64_t captured_utime = 0;
+};
+
+std::filesystem::path WriteLog(const std::string& name, const std::vector<Captured>& keyframes) {
   std::filesystem::path path = std::filesystem::path(testing::TempDir()) / name;
   std::filesystem::remove(path);
   LogFileWriter file(path.string());
-  for (const auto& [seq, utime] : keyframes) {
+  for (const Captured& keyframe : keyframes) {
     KeyframeMessage message{};
-    message.id.map.agent_id = agent;
+    message.id.map.agent_id = keyframe.agent;
     message.id.map.opened_utime = 100;
-    message.id.seq = seq;
-    message.utime = utime;
-    file.Write(utime, "KEYFRAME_" + std::to_string(agent), EncodeMessage(message));
+    message.id.seq = keyframe.seq;
+    message.utime = keyframe.utime;
+    file.Write(keyframe.captured_utime, "KEYFRAME_" + std::to_string(keyframe.agent),
+               EncodeMessage(message));
   }
   return path;
+}
+
+// A log of keyframes of one map: (seq, utime).
+std::filesystem::path WriteLog(const std::string& name, int32_t agent,
+                               const std::vector<std::pair<int32_t, int64_t>>& keyframes) {
+  std::vector<Captured> captured;
+  for (const auto& [seq, utime] : keyframes) {
+    captured.push_back({agent, seq, utime, utime});
+  }
+  return WriteLog(name, captured);
 }
 
 std::string ErrorOf(const std::filesystem::path& log) {
@@ -87,6 +103,26 @@ TEST(KeyframeLog, InterleavesByElapsedTime) {
   EXPECT_THAT(elapsed_us, testing::ElementsAre(0, 0, 410, 500, 1000, 1110));
   EXPECT_THAT(order, testing::ElementsAre(std::pair{1, 0}, std::pair{2, 0}, std::pair{2, 1},
                                           std::pair{1, 1}, std::pair{1, 2}, std::pair{2, 2}));
+}
+
+// Whole sessions: the second agent of each log has a clock of its own, and begins later.
+TEST(KeyframeLog, InterleavesAgentsOfDifferentClocksByTheCaptureOfTheirFirstKeyframes) {
+  std::vector<std::vector<LoggedKeyframe>> logs;
+  logs.push_back(ReadKeyframeLog(WriteLog("two_clocks.lcm", {{1, 0, 900'000, 50},
+                                                             {1, 1, 900'100, 150},
+                                                             {2, 0, 7, 170},
+                                                             {1, 2, 900'200, 250},
+                                                             {2, 1, 107, 270}})));
+  logs.push_back(ReadKeyframeLog(WriteLog(
+      "two_other_clocks.lcm",
+      {{3, 0, 40, 2000}, {4, 0, 800'000, 2060}, {3, 1, 150, 2110}, {4, 1, 800'100, 2160}})));
+  std::vector<std::pair<int32_t, int64_t>> order;
+  for (const LoggedKeyframe& keyframe : Interleave(logs)) {
+    order.emplace_back(keyframe.id.map.agent_id, keyframe.elapsed_us);
+  }
+  EXPECT_THAT(order, testing::ElementsAre(std::pair{1, 0}, std::pair{3, 0}, std::pair{4, 60},
+                                          std::pair{1, 100}, std::pair{3, 110}, std::pair{2, 120},
+                                          std::pair{4, 160}, std::pair{1, 200}, std::pair{2, 220}));
 }
 
 }  // namespace
