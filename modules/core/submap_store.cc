@@ -86,6 +86,9 @@ bool SubmapStore::Restore(ByteReader* reader) {
     reader->Get(&has_edge);
     reader->Get(&edge_from_seq);
     reader->Get(&edge_m);
+    if (offset < 0) {
+      return false;  // it would be a record in memory
+    }
     keyframes.emplace_hint(keyframes.end(), id,
                            Stored{Record(offset, size), p_odom_body,
                                   has_edge ? std::optional(edge_from_seq) : std::nullopt, edge_m});

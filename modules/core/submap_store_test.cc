@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -186,6 +187,11 @@ TEST(SubmapStore, RestoresAllOfItsBytesOrNothing) {
     EXPECT_EQ(unchanged.size(), 1u) << off;
     EXPECT_NE(unchanged.Find({kMap, 7}), nullptr) << off;
   }
+  // After the count and the first keyframe's id (map and seq) comes the place of its record.
+  std::vector<uint8_t> nowhere = bytes;
+  std::fill_n(nowhere.begin() + 20, sizeof(int64_t), 0xff);
+  ByteRecordReader of_nowhere(nowhere);
+  EXPECT_FALSE(SubmapStore({}, records).Restore(&of_nowhere));
   SubmapStore restored({}, records);
   ByteRecordReader reader(bytes);
   ASSERT_TRUE(restored.Restore(&reader));

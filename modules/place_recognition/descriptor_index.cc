@@ -80,8 +80,8 @@ void DescriptorIndex::Save(ByteWriter* writer) {
 
 bool DescriptorIndex::Restore(ByteReader* reader) {
   reader->Get(&num_corners_);
-  return std::ranges::all_of(tables_,
-                             [reader](Table& table) { return table.postings.Restore(reader); });
+  return std::ranges::all_of(
+      tables_, [&](Table& table) { return table.postings.Restore(reader, num_corners_.size()); });
 }
 
 template <typename Visit>

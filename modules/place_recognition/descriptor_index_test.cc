@@ -61,6 +61,24 @@ TEST(DescriptorIndex, AQueryOfFiveThousandKeyframesComparesAFewPostingsPerCorner
   EXPECT_LT(index.CountPostings(corners) / static_cast<int64_t>(corners.size()), 60);
 }
 
+TEST(DescriptorIndex, IsNotRestoredWithPostingsOfAKeyframeThatItLacks) {
+  test::TestWorld world(1);
+  DescriptorIndex index;
+  for (int i = 0; i < 3; ++i) {
+    index.Add(world.See({kMap, i}, {0, 0, 1.5}, 0).corners);
+  }
+  ByteRecordWriter writer;
+  index.Save(&writer);
+  std::vector<uint8_t> bytes = writer.Take();
+  ByteRecordReader whole(bytes);
+  EXPECT_TRUE(DescriptorIndex().Restore(&whole));
+  // The bytes begin with a count and as many numbers of corners.
+  bytes[0] = 2;
+  bytes.erase(bytes.begin() + 4, bytes.begin() + 8);
+  ByteRecordReader one_less(bytes);
+  EXPECT_FALSE(DescriptorIndex().Restore(&one_less));
+}
+
 double HeapBytes() {
   const struct mallinfo2 info = mallinfo2();
   return static_cast<double>(info.uordblks) + static_cast<double>(info.hblkhd);

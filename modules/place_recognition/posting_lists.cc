@@ -129,7 +129,7 @@ void PostingLists::Save(ByteWriter* writer) const {
   writer->Put(begin_);
 }
 
-bool PostingLists::Restore(ByteReader* reader) {
+bool PostingLists::Restore(ByteReader* reader, size_t num_keyframes) {
   uint64_t num_spans = 0;
   std::vector<uint64_t> high;
   std::vector<uint8_t> low;
@@ -152,7 +152,7 @@ bool PostingLists::Restore(ByteReader* reader) {
   restored.low_ = std::move(low);
   restored.signatures_ = std::move(signatures);
   restored.begin_ = std::move(begin);
-  if (!restored.IsConsistent()) {
+  if (!restored.IsConsistent() || !restored.IsOf(num_keyframes)) {
     return false;
   }
   *this = std::move(restored);
@@ -174,6 +174,30 @@ bool PostingLists::IsConsistent() const {
     bit = SkipZeros(bit, words * num_spans_);
   }
   return bit == num_packed() + num_words_ * num_spans_;
+}
+
+bool PostingLists::IsOf(size_t num_keyframes) const {
+  const size_t num_spans = (num_keyframes + (size_t{1} << kLowBits) - 1) >> kLowBits;
+  if (num_spans_ != num_spans) {
+    return num_spans_ < num_spans;
+  }
+  if (num_spans == 0) {
+    return true;
+  }
+  // Only the last span may go beyond the keyframes.
+  const size_t num_low = num_keyframes - ((num_spans - 1) << kLowBits);
+  size_t bit = 0;
+  for (size_t word = 0; word < num_words_; ++word) {
+    const size_t last_span = SkipZeros(bit, num_spans - 1);
+    bit = SkipZeros(last_span, 1);
+    const size_t zeros = word * num_spans + num_spans - 1;
+    if (std::any_of(low_.begin() + static_cast<ptrdiff_t>(last_span - zeros),
+                    low_.begin() + static_cast<ptrdiff_t>(bit - 1 - zeros),
+                    [num_low](uint8_t low) { return low >= num_low; })) {
+      return false;
+    }
+  }
+  return true;
 }
 
 }  // namespace pangea

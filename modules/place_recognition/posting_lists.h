@@ -33,9 +33,10 @@ class PostingLists {
   // Packs the waiting postings. It copies all postings, so call it only when many wait.
   void Pack();
   // Save requires that no posting waits. Restore returns false, and changes nothing, if the bytes
-  // are not those of PostingLists with the same number of words.
+  // are not those of PostingLists with the same number of words and keyframes 0 .. num_keyframes -
+  // 1.
   void Save(ByteWriter* writer) const;
-  bool Restore(ByteReader* reader);
+  bool Restore(ByteReader* reader, size_t num_keyframes);
   size_t num_packed() const { return signatures_.size(); }
   size_t num_waiting() const { return waiting_.size(); }
 
@@ -154,6 +155,8 @@ class PostingLists {
   using WordAndNumber = std::pair<size_t, uint32_t>;
   void ListWaiting(size_t block, std::vector<WordAndNumber>* waiting) const;
   bool IsConsistent() const;
+  // Whether all packed postings are of keyframes 0 .. num_keyframes - 1.
+  bool IsOf(size_t num_keyframes) const;
 
   size_t num_words_;
   size_t num_spans_;

@@ -60,5 +60,28 @@ TEST(PostingLists, VisitsWhatPlainListsWouldWheneverItIsPacked) {
   }
 }
 
+// A query counts votes by keyframe: a number that no keyframe has would be outside of its memory.
+TEST(PostingLists, AreNotRestoredWithPostingsOfOtherKeyframes) {
+  constexpr uint32_t kWords = 12;
+  for (const size_t num_keyframes : {1, 256, 257, 600}) {
+    PostingLists lists(kWords);
+    for (size_t keyframe = 0; keyframe < num_keyframes; ++keyframe) {
+      lists.Add(static_cast<uint32_t>(keyframe % kWords), static_cast<int32_t>(keyframe), 7);
+    }
+    lists.Pack();
+    ByteRecordWriter writer;
+    lists.Save(&writer);
+    const std::vector<uint8_t> bytes = writer.Take();
+    const auto restores = [&bytes](size_t keyframes) {
+      ByteRecordReader reader(bytes);
+      return PostingLists(kWords).Restore(&reader, keyframes);
+    };
+    EXPECT_TRUE(restores(num_keyframes)) << num_keyframes;
+    EXPECT_TRUE(restores(num_keyframes + 300)) << "the others have no corners";
+    EXPECT_FALSE(restores(num_keyframes - 1)) << num_keyframes;
+    EXPECT_FALSE(restores(0)) << num_keyframes;
+  }
+}
+
 }  // namespace
 }  // namespace pangea

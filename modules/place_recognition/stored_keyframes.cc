@@ -11,9 +11,13 @@ namespace {
 constexpr size_t kRayBytes = 4 * sizeof(double);
 constexpr size_t kCornerBytes = 45;
 
+constexpr size_t RecordBytes(size_t num_corners) {
+  return 2 * sizeof(uint32_t) + (kCornerBytes + kRayBytes) * num_corners;
+}
+
 std::vector<uint8_t> ToRecord(const RecognisedKeyframe& keyframe) {
   ByteRecordWriter writer;
-  writer.Reserve(2 * sizeof(uint32_t) + (kCornerBytes + kRayBytes) * keyframe.corners.size());
+  writer.Reserve(RecordBytes(keyframe.corners.size()));
   PutCorners(keyframe.corners, &writer);
   writer.Put(static_cast<uint32_t>(keyframe.rays.size()));
   for (const CornerRay& ray : keyframe.rays) {
@@ -96,10 +100,28 @@ void AscendingNumbers::Save(ByteWriter* writer) const {
   writer->Put(gaps_);
 }
 
-void AscendingNumbers::Restore(ByteReader* reader) {
+bool AscendingNumbers::Restore(ByteReader* reader) {
   reader->Get(&first_);
   reader->Get(&last_);
   reader->Get(&gaps_);
+  return reader->ok() && IsConsistent();
+}
+
+bool AscendingNumbers::IsConsistent() const {
+  if (last_ < first_) {
+    return gaps_.empty();
+  }
+  constexpr int kMaxShift = 28;  // five bytes hold every gap
+  int64_t number = first_;
+  int shift = 0;
+  for (const uint8_t byte : gaps_) {
+    number += static_cast<int64_t>(byte & 0x7f) << shift;
+    shift = (byte & 0x80) == 0 ? 0 : shift + 7;
+    if (number > last_ || shift > kMaxShift) {
+      return false;
+    }
+  }
+  return first_ >= 0 && shift == 0 && number == last_;
 }
 
 std::vector<uint8_t> CornersRecord(const Keyframe& keyframe) {
@@ -131,6 +153,7 @@ void StoredKeyframes::Save(ByteWriter* writer) const {
 
 bool StoredKeyframes::Restore(ByteReader* reader) {
   constexpr size_t kLeastBytes = 32;
+  constexpr size_t kMaxRecordBytes = RecordBytes(kMaxCorners);
   std::deque<Stored> keyframes;
   for (size_t left = reader->GetCount(kLeastBytes); left > 0; --left) {
     KeyframeId id;
@@ -138,9 +161,12 @@ bool StoredKeyframes::Restore(ByteReader* reader) {
     int64_t offset = 0;
     uint32_t size = 0;
     reader->Get(&id);
-    landmarks.Restore(reader);
+    const bool has_landmarks = landmarks.Restore(reader);
     reader->Get(&offset);
     reader->Get(&size);
+    if (!has_landmarks || id.seq < 0 || offset < 0 || size > kMaxRecordBytes) {
+      return false;
+    }
     keyframes.push_back({id, std::move(landmarks), Record(offset, size)});
   }
   keyframes_ = std::move(keyframes);

@@ -32,7 +32,8 @@ struct RecognisedKeyframe {
   RecognisedKeyframe() = default;
 };
 
-// A compact list of ascending numbers: the first one, and the differences as base-128 varints.
+// A compact list of ascending numbers, 0 or higher: the first one, and the differences as base-128
+// varints.
 class AscendingNumbers {
  public:
   AscendingNumbers() = default;
@@ -41,9 +42,13 @@ class AscendingNumbers {
   bool HasOneOf(const std::vector<int32_t>& ascending) const;
 
   void Save(ByteWriter* writer) const;
-  void Restore(ByteReader* reader);
+  // False if the bytes are not those of AscendingNumbers.
+  bool Restore(ByteReader* reader);
 
  private:
+  // Whether the gaps lead from the first number to the last one.
+  bool IsConsistent() const;
+
   int32_t first_ = 0;
   int32_t last_ = -1;  // last_ < first_: the list is empty
   std::vector<uint8_t> gaps_;
