@@ -43,7 +43,7 @@ std::optional<std::vector<KeyframeId>> PendingMatches::FirstOf(const std::set<Ma
     if (!queries) {
       return std::nullopt;
     }
-    std::erase_if(*queries, [&](const KeyframeId& query) { return finished_.contains(query); });
+    finished_.RemoveFrom(map, &*queries);
     if (const auto found = std::ranges::min_element(*queries); found != queries->end()) {
       first.push_back(*found);
     }
@@ -62,7 +62,7 @@ bool PendingMatches::HasAllResults(const KeyframeId& query) {
 void PendingMatches::LookForFinished(const std::vector<KeyframeId>& queries) {
   for (const KeyframeId& query : queries) {
     if (HasAllResults(query)) {
-      finished_.insert(query);
+      finished_.Add(query);
     }
   }
 }

@@ -8,6 +8,7 @@
 #include <set>
 #include <vector>
 
+#include "cluster/finished_queries.h"
 #include "cluster/site_streams.h"
 #include "core/server_messages.h"
 
@@ -28,9 +29,7 @@ class PendingMatches {
   void LookForFinished(const std::vector<KeyframeId>& queries);
 
   SiteStreams& streams_;
-  // Queries with all results whose match is still in the stream: if NATS is killed at the wrong
-  // moment, an acknowledged match stays there for ever.
-  std::set<KeyframeId> finished_;
+  FinishedQueries finished_;
   int64_t next_look_utime_ = 0;
 };
 
