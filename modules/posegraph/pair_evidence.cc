@@ -11,7 +11,7 @@
 namespace pangea {
 namespace {
 
-// A pair takes no further candidates beyond this number: each new one is compared with all others.
+// Each new candidate is compared with all others, so their number is bounded.
 constexpr size_t kMaxCandidates = 600;
 constexpr size_t kMaxSeeds = 10;
 constexpr size_t kMaxCompared = 40;
@@ -89,10 +89,15 @@ PairEvidence::Innovation PairEvidence::Compare(const Candidate& k, const Candida
   return innovation;
 }
 
-bool PairEvidence::Agree(const Candidate& k, const Candidate& l) const {
+bool PairEvidence::Predicts(const Candidate& l, const Candidate& k) const {
   const Innovation innovation = Compare(k, l);
   const Matrix4d covariance = innovation.measurement + innovation.odometry;
   return innovation.error.dot(covariance.ldlt().solve(innovation.error)) <= kMaxLoopChi2;
+}
+
+// Tests both directions, so that the result does not depend on the order of arrival.
+bool PairEvidence::Agree(const Candidate& k, const Candidate& l) const {
+  return Predicts(l, k) && Predicts(k, l);
 }
 
 bool PairEvidence::AgreeAt(int k, int l) const {
@@ -100,20 +105,36 @@ bool PairEvidence::AgreeAt(int k, int l) const {
 }
 
 void PairEvidence::Add(const Measurement& measurement) {
-  if (candidates_.size() >= kMaxCandidates) {
-    return;
-  }
   Candidate candidate{measurement, {}, {}};
   const Relative4& relative = measurement.relative;
   const Eigen::Vector3d& p_a = (*a_)[measurement.node_a].T_odom_body.t;
   const Eigen::Vector3d& p_b = (*b_)[measurement.node_b].T_odom_body.t;
   candidate.T_odom_a_odom_b = {p_a + relative.t - YawRotation(relative.yaw) * p_b, relative.yaw};
+  if (candidates_.size() >= kMaxCandidates) {
+    if (decision_.merge) {
+      return AddToMerge(candidate);
+    }
+    ForgetOldest();
+  }
   for (const Candidate& earlier : candidates_) {
-    // Test both directions, so that the result does not depend on the order of arrival.
-    candidate.agrees.push_back(Agree(candidate, earlier) && Agree(earlier, candidate));
+    candidate.agrees.push_back(Agree(candidate, earlier));
   }
   candidates_.push_back(std::move(candidate));
   Decide();
+}
+
+void PairEvidence::AddToMerge(const Candidate& candidate) {
+  if (std::ranges::all_of(agreeing_, [&](int k) { return Agree(candidate, candidates_[k]); })) {
+    std::vector<int64_t>& ids = decision_.agreeing;
+    ids.insert(std::ranges::upper_bound(ids, candidate.id), candidate.id);
+  }
+}
+
+void PairEvidence::ForgetOldest() {
+  candidates_.erase(candidates_.begin());
+  for (Candidate& candidate : candidates_) {
+    candidate.agrees.erase(candidate.agrees.begin());
+  }
 }
 
 void PairEvidence::Save(ByteWriter* writer) const {

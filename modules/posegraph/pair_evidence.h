@@ -10,6 +10,9 @@
 // thinning derived replaces constraints that once sufficed for a merge, so it counts as sufficient
 // evidence by itself; the test against rivals remains. The decision depends only on the set of
 // constraints, not on their order, and a growing rival set can revoke a merge.
+//
+// At most 600 candidates are compared. If these merge the maps, the decision is final, and a later
+// constraint that agrees with all agreeing ones is one of them. If not, the oldest are forgotten.
 
 #include <cstdint>
 #include <optional>
@@ -86,6 +89,7 @@ class PairEvidence {
   enum class Drift : uint8_t { kAsClaimed, kBelievable };
   Innovation Compare(const Candidate& k, const Candidate& l,
                      Drift drift = Drift::kBelievable) const;
+  bool Predicts(const Candidate& l, const Candidate& k) const;
   bool Agree(const Candidate& k, const Candidate& l) const;
   bool AgreeAt(int k, int l) const;
   // Greedy largest set of mutually agreeing candidates among `among`.
@@ -95,6 +99,8 @@ class PairEvidence {
   bool Enough(const std::vector<int>& viewpoints, int rival_viewpoints) const;
   bool DifferentViewpoint(const Candidate& k, const Candidate& l) const;
   int BestMember(const std::vector<int>& agreeing) const;
+  void AddToMerge(const Candidate& candidate);
+  void ForgetOldest();
   void Decide();
 
   const OdometryChain* a_;
