@@ -98,6 +98,52 @@ TEST_F(AnchorLink, AnotherAgentsRequestsAreRefused) {
                                      "anchor edit: invalid id, editor, revision or right"}));
 }
 
+AnchorEdit Nameless(AnchorEdit edit) {
+  edit.name.clear();
+  return edit;
+}
+
+TEST_F(AnchorLink, AnAnchorWithoutANameIsRefused) {
+  PublishMessage(server_bus, channels::AnchorRequest(0),
+                 ToMessage(Nameless(TestEdit({2, 5}, 1, 0))));
+  Request(Nameless(TestEdit({1, 5}, 1, 1)));
+  Run(2);
+  ExpectOnceEach(0);
+  EXPECT_THAT(handler_refused, testing::Contains("anchor edit: no name"));
+  EXPECT_THAT(uplink_refused, testing::Contains("anchor edit: no name"));
+  AnchorEdit deletion = Nameless(TestEdit({1, 5}, 2, 1));
+  deletion.deleted = true;
+  Request(deletion);
+  Run(2);
+  ExpectOnceEach(1);
+}
+
+// As by the uplink of an earlier version.
+TEST_F(AnchorLink, AnAnchorWithoutANameIsRefusedToTheAgentToo) {
+  KillUplink();
+  UplinkSession session(1, ReadKeyFileOf(KeyFile(1), 1));
+  std::vector<AnchorEditAnswer> answers;
+  link_bus.Subscribe("LINK_DOWN_1", [&](const std::string&, Bytes data) {
+    const auto opened = session.Open(data);
+    if (opened.packet && opened.packet->kind == LinkKind::kAnchorEditAnswers) {
+      answers = ParseAnchorEditAnswers(opened.packet->body).value.value();
+    }
+  });
+  int64_t number = 0;
+  const auto send = [&](LinkKind kind, const std::vector<uint8_t>& body) {
+    link_bus.Publish("LINK_UP_1", session.Seal({kind, ++number, body}));
+    Run(1);
+  };
+  for (int i = 0; i < 3; ++i) {
+    send(LinkKind::kHello, Encode(LinkHello{"test", {}}));
+  }
+  send(LinkKind::kAnchorEdit, EncodeAnchorEdit(Nameless(TestEdit({1, 5}, 1, 1))));
+  ExpectOnceEach(0);
+  ASSERT_EQ(answers.size(), 1u);
+  EXPECT_EQ(answers[0].anchor, (AnchorId{1, 5}));
+  EXPECT_FALSE(answers[0].journalled);
+}
+
 TEST_F(AnchorLink, ToolsOnTheServersBusEditAll) {
   AnchorEdit edit = TestEdit({2, 5}, 1, 44);
   edit.right = AnchorRight::kRead;

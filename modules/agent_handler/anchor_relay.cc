@@ -25,6 +25,9 @@ AnchorRelay::AnchorRelay(Node& node, Archive& archive) : node_(node), archive_(a
   node_.Listen<anchor_edit_t>(channels::AnchorRequest(0), [this](AnchorEdit edit) {
     edit.agent_id = 0;
     edit.right = AnchorRight::kEditAll;
+    if (const std::string refusal = RefusalOfNewEdit(edit); !refusal.empty()) {
+      return node_.Refuse(refusal);
+    }
     if (from_tools_.size() >= kMaxFromTools) {
       return node_.Refuse("too many edits of anchors wait for the disk");
     }
@@ -74,9 +77,13 @@ std::string AnchorRelay::OnPacket(int32_t agent_id, const LinkPacket& packet) {
 
 void AnchorRelay::OnEdit(int32_t agent_id, Agent* agent, AnchorEdit edit) {
   edit.right = agent->right;
-  if (!Allows(agent->right, agent_id, edit)) {
+  const std::string refusal =
+      Allows(agent->right, agent_id, edit)
+          ? RefusalOfNewEdit(edit)
+          : fmt::format("agent {}'s key does not allow its edit of an anchor", agent_id);
+  if (!refusal.empty()) {
     node_.Count("anchor_edits_refused");
-    node_.Refuse(fmt::format("agent {}'s key does not allow its edit of an anchor", agent_id));
+    node_.Refuse(refusal);
     return Answer(agent, edit, false);
   }
   switch (archive_.Append(edit)) {

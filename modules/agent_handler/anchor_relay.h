@@ -3,9 +3,9 @@
 // Relays anchors between the agents and the server: edits go up into the journal, states go down to
 // the agents.
 //   server bus: ANCHOR_REQUEST_0, ANCHOR_k in; ANCHOR_EDIT out (journal/anchor_edits.h)
-// An edit is checked against the right of its editor's key, as far as the edit alone tells: with
-// kEditOwn, the editor must be the maker in the anchor's id. Refused edits are answered too, so
-// that the agent stops sending them.
+// An edit must name its anchor, and is checked against the right of its editor's key, as far as the
+// edit alone tells: with kEditOwn, the editor must be the maker in the anchor's id. Refused edits
+// are answered too, so that the agent stops sending them.
 
 #include <cstdint>
 #include <deque>

@@ -42,7 +42,7 @@ struct AnchorEdit {
   AnchorRight right = AnchorRight::kUnknown;
   int64_t seq = -1;  // number of the edit in the journal, from 0; -1: not journalled yet
   bool deleted = false;
-  std::string name;     // at most kMaxAnchorName bytes
+  std::string name;     // at most kMaxAnchorName bytes; empty: RefusalOfNewEdit
   std::string payload;  // at most kMaxAnchorPayload bytes; only the apps interpret it
   Placement placement = Placement::kSame;
   MapId map;  // this field and those below are not read with kSame
@@ -55,6 +55,10 @@ struct AnchorEdit {
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  // raw (distorted)
   std::optional<Matrix6d> covariance;               // of T_ref_anchor; none: not known
 };
+
+// Why an edit may not enter a journal, or an empty string. An anchor must have a name; journals of
+// earlier versions also have anchors without one.
+std::string RefusalOfNewEdit(const AnchorEdit& edit);
 
 inline constexpr size_t kMaxAnchorName = 50;
 inline constexpr size_t kMaxAnchorPayload = 1000;
@@ -73,6 +77,9 @@ struct AnchorState {
   Rigid3 T_odom_anchor;        // odom frame of `map`; valid near the agent's newest keyframe
   Matrix6d covariance = Matrix6d::Identity();
 };
+
+// The anchor's name; its id if it has none.
+std::string NameOf(const AnchorState& state);
 
 struct ShownAnchor {
   AnchorId anchor;

@@ -44,6 +44,9 @@ void UplinkAnchors::OnRequest(AnchorEdit edit) {
   if (edit.agent_id != 0 && edit.agent_id != agent_id_) {
     return node_.Refuse("another agent's edit of an anchor");
   }
+  if (const std::string refusal = RefusalOfNewEdit(edit); !refusal.empty()) {
+    return node_.Refuse(refusal);
+  }
   edit.agent_id = agent_id_;
   edit.right = AnchorRight::kUnknown;
   edit.seq = -1;

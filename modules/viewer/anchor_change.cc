@@ -43,7 +43,7 @@ std::optional<AnchorEdit> EditOf(const Scene& scene, const AnchorChange& change,
       return std::nullopt;
     }
     edit.revision = known->revision + 1;
-    edit.name = known->name;
+    edit.name = NameOf(*known);
     edit.payload = known->payload;
   }
   if (change.deleted) {

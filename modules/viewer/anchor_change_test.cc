@@ -83,6 +83,16 @@ TEST_F(AnchorChangeTest, AMoveKeepsAllElse) {
             1e-12);
 }
 
+// A new edit must have a name; an anchor of an earlier version may have none.
+TEST_F(AnchorChangeTest, AMoveOfOneWithoutANameGivesItOne) {
+  AnchorState known = TestAnchor(5, kOne);
+  known.name.clear();
+  scene_.Take(known);
+  AnchorChange change;
+  change.anchor = known.anchor;
+  EXPECT_EQ(EditOf(scene_, change, kNow).value().name, "1/5");
+}
+
 TEST_F(AnchorChangeTest, ADeletedOneIsNotMoved) {
   scene_.Take(TestAnchor(5, kOne));
   AnchorChange change;

@@ -120,6 +120,18 @@ TEST_F(AnchorEditsTest, GoOnAfterARestart) {
   EXPECT_TRUE(again.empty());
 }
 
+TEST_F(AnchorEditsTest, AnchorsWithoutANameInTheJournalOfAnEarlierVersionStay) {
+  AnchorEdit nameless = TestEdit({1, 5}, 1, 1);
+  nameless.name.clear();
+  archive->Append(nameless);
+  Sync();
+  Start();
+  Ask(0, 0);
+  ASSERT_EQ(again.size(), 1u);
+  EXPECT_EQ(again[0].anchor, nameless.anchor);
+  EXPECT_EQ(again[0].name, "");
+}
+
 TEST_F(AnchorEditsTest, TheNewestIsRepeated) {
   archive->PublishHave();
   bus.Drain();

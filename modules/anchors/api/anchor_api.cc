@@ -237,7 +237,7 @@ void AnchorApi::Change(const web::WebRequest& request, const ListedAnchor& ancho
   const AnchorId id = anchor.state.anchor;
   AnchorEdit edit;
   edit.anchor = id;
-  edit.name = anchor.state.name;
+  edit.name = NameOf(anchor.state);
   edit.payload = anchor.state.payload;
   edit.deleted = request.method == "DELETE";
   std::optional<int64_t> known;

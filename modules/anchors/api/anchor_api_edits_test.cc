@@ -70,6 +70,21 @@ TEST_F(AnchorApiTest, AnEditOfWhatIsOldIsAConflict) {
   EXPECT_EQ(good->status, 200);
 }
 
+// Such an anchor is in a journal of an earlier version; a new edit must have a name.
+TEST_F(AnchorApiTest, AChangeOfAnAnchorWithoutANameGivesItOne) {
+  Make();
+  AnchorEdit nameless = requested_.back();
+  nameless.anchor.created_utime += 5;
+  nameless.name.clear();
+  Journal(nameless);
+  const std::string id = ToString(nameless.anchor);
+  EXPECT_EQ(Get("/v1/anchors/" + id).body["name"], "");
+  const auto changed = Ask("PUT", "/v1/anchors/" + id, R"({"payload": "cold"})");
+  JournalNewest();
+  EXPECT_EQ(changed->status, 200);
+  EXPECT_EQ(changed->body["name"], id);
+}
+
 TEST_F(AnchorApiTest, TwoChangesAtOnceHaveTwoRevisions) {
   const std::string target = "/v1/anchors/" + Make()["id"].get<std::string>();
   const auto first = Ask("PUT", target, R"({"name": "first"})");

@@ -160,6 +160,9 @@ AnchorId PhoneAgent::PlaceAnchor(const NewAnchor& anchor) {
   edit.placement = anchor.pixel ? AnchorEdit::Placement::kPixel : AnchorEdit::Placement::kBody;
   edit.pixel = anchor.pixel.value_or(Eigen::Vector2d::Zero());
   edit.T_ref_anchor = anchor.T_body_anchor;
+  if (const std::string refusal = RefusalOfNewEdit(edit); !refusal.empty()) {
+    throw std::runtime_error(refusal);
+  }
   const anchor_edit_t message = ToMessage(edit);
   if (const auto parsed = Parse(message); !parsed.value) {
     throw std::runtime_error(parsed.refused);
