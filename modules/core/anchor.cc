@@ -12,6 +12,19 @@ std::string RefusalOfNewEdit(const AnchorEdit& edit) {
   return edit.name.empty() && !edit.deleted ? "anchor edit: no name" : "";
 }
 
+bool IsSameChange(const AnchorEdit& a, const AnchorEdit& b) {
+  constexpr double kPrecision = 1e-6;
+  const Rigid3 &T_a = a.T_ref_anchor, &T_b = b.T_ref_anchor;
+  if (a.deleted || b.deleted) {
+    return a.deleted && b.deleted;
+  }
+  return a.name == b.name && a.payload == b.payload && a.placement == b.placement &&
+         (a.placement == AnchorEdit::Placement::kSame ||
+          (a.map == b.map && a.keyframe_seq == b.keyframe_seq && a.utime == b.utime &&
+           T_a.t.isApprox(T_b.t, kPrecision) && T_a.q.angularDistance(T_b.q) < kPrecision &&
+           a.pixel.isApprox(b.pixel, 1e-4)));
+}
+
 std::string NameOf(const AnchorState& state) {
   return state.name.empty() ? ToString(state.anchor) : state.name;
 }

@@ -60,6 +60,10 @@ struct AnchorEdit {
 // earlier versions also have anchors without one.
 std::string RefusalOfNewEdit(const AnchorEdit& edit);
 
+// Whether two edits of one anchor with one revision change the same. Two tools on the server (agent
+// 0) may use one revision for different edits; the journal has only the first.
+bool IsSameChange(const AnchorEdit& a, const AnchorEdit& b);
+
 inline constexpr size_t kMaxAnchorName = 50;
 inline constexpr size_t kMaxAnchorPayload = 1000;
 

@@ -117,16 +117,43 @@ TEST_F(LiveAnchorsWithMap, ARequestIsRepeatedUntilTheJournalHasIt) {
   EXPECT_EQ(process_.scene().notice().text, "");
 }
 
-TEST_F(LiveAnchorsWithMap, TheAnchorItselfIsAnAnswerToo) {
+// Two viewers move one anchor at once: both edits have the next revision, and the journal takes the
+// first.
+TEST_F(LiveAnchorsWithMap, PagesAreToldWhenAnotherEditCameFirst) {
   MoveKnownAnchor();
   TickAt(1.1);
   ASSERT_THAT(requests_, SizeIs(1));
   EXPECT_EQ(requests_[0].revision, 2);
+  AnchorEdit of_another = requests_[0];
+  of_another.T_ref_anchor.t.x() += 1;
+  of_another.seq = 4;
+  Say("ANCHOR_EDIT", ToMessage(of_another));
+  EXPECT_EQ(process_.scene().notice().text,
+            "\"anchor 3\" was not changed: another edit came first");
+  TickAt(2.5);
+  EXPECT_THAT(requests_, SizeIs(1));
+}
+
+// ANCHOR does not tell whose edit it shows.
+TEST_F(LiveAnchorsWithMap, TheAnchorAloneIsNoAnswer) {
+  MoveKnownAnchor();
+  TickAt(1.1);
   AnchorState moved = TestAnchor(3, TestMap(1));
   moved.revision = 2;
   Say("ANCHOR", ToMessage(moved));
   TickAt(2.5);
-  EXPECT_THAT(requests_, SizeIs(1));
+  EXPECT_THAT(requests_, SizeIs(2));
+}
+
+TEST_F(LiveAnchorsWithMap, AnAnchorThatIsMovedAgainBeforeItIsShownMovesAgain) {
+  MoveKnownAnchor();
+  TickAt(1.1);
+  ASSERT_THAT(requests_, SizeIs(1));
+  Say("ANCHOR_EDIT", ToMessage(requests_[0]));
+  MoveKnownAnchor();
+  TickAt(1.2);
+  ASSERT_THAT(requests_, SizeIs(2));
+  EXPECT_EQ(requests_[1].revision, 3);
 }
 
 TEST_F(LiveAnchorsWithMap, PagesAreToldWhenNobodyAnswers) {
@@ -135,7 +162,7 @@ TEST_F(LiveAnchorsWithMap, PagesAreToldWhenNobodyAnswers) {
     TickAt(time_s);
   }
   EXPECT_THAT(requests_, SizeIs(20));
-  EXPECT_THAT(process_.scene().notice().text, HasSubstr("\"anchor 3\" was not changed"));
+  EXPECT_EQ(process_.scene().notice().text, "\"anchor 3\": the server did not confirm the change");
 }
 
 TEST_F(LiveAnchors, PagesAreToldOfWhatIsNotThere) {

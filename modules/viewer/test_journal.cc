@@ -30,14 +30,14 @@ class TestJournal {
  private:
   void Take(anchor_edit_t edit) {
     const std::pair<AnchorId, int64_t> key{*Parse(edit.anchor).value, edit.revision};
-    const auto [number, first] = numbers_.emplace(key, static_cast<int64_t>(numbers_.size()));
-    edit.seq = number->second;
+    edit.seq = static_cast<int64_t>(edits_.size());
     edit.may = anchor_edit_t::MAY_EDIT_ALL;
-    PublishMessage(bus_, std::string(channels::kAnchorEdit), edit);
+    const auto journalled = edits_.try_emplace(key, std::move(edit)).first;
+    PublishMessage(bus_, std::string(channels::kAnchorEdit), journalled->second);
   }
 
   LcmBus& bus_;
-  std::map<std::pair<AnchorId, int64_t>, int64_t> numbers_;
+  std::map<std::pair<AnchorId, int64_t>, anchor_edit_t> edits_;
 };
 
 }  // namespace

@@ -56,7 +56,7 @@ void ViewerProcess::OnMessage(const std::string& channel, Bytes data) {
     keyframes_.Note(keyframe->id.map, keyframe->id.seq);
   }
   if (const auto* anchor = std::get_if<AnchorState>(&*outcome.event)) {
-    requests_.Heard(anchor->anchor, anchor->revision);
+    requests_.Shown(anchor->anchor, anchor->revision);
   }
   std::visit([this](const auto& event) { scene_.Take(event); }, *outcome.event);
 }
@@ -77,10 +77,10 @@ void ViewerProcess::AskForMissing(int64_t now_utime) {
   }
 }
 
-// An edit of another agent with the same revision also ends our request: of equal revisions the
-// higher agent id wins, and ours is 0. ANCHOR then shows the result.
 void ViewerProcess::OnAnchorEdit(const AnchorEdit& edit) {
-  requests_.Heard(edit.anchor, edit.revision);
+  if (const auto lost = requests_.TakeLost(edit)) {
+    scene_.Tell(fmt::format("\"{}\" was not changed: another edit came first", lost->name));
+  }
 }
 
 int64_t ViewerProcess::NewAnchorUtime() {
@@ -100,7 +100,7 @@ void ViewerProcess::Change(const AnchorChange& change) {
 void ViewerProcess::PublishRequests() {
   for (const AnchorEdit& edit : requests_.TakeGivenUp(now_utime_)) {
     node_.Refuse("anchor edit: not in the journal after 20 s");
-    scene_.Tell(fmt::format("\"{}\" was not changed: the server did not answer", edit.name));
+    scene_.Tell(fmt::format("\"{}\": the server did not confirm the change", edit.name));
   }
   for (const AnchorEdit& edit : requests_.Due(now_utime_)) {
     node_.Publish(channels::AnchorRequest(0), ToMessage(edit));

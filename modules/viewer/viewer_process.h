@@ -5,8 +5,8 @@
 // does.
 //
 // Changes of anchors by people are published on ANCHOR_REQUEST_0, each edit once per second until
-// ANCHOR_EDIT or ANCHOR shows that it is in the journal; after 20 s the pages are told that it
-// failed.
+// ANCHOR_EDIT shows that it is in the journal. The pages are told if another edit has overridden
+// it, and if it is not there after 20 s.
 
 #include <set>
 #include <string>

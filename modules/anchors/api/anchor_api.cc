@@ -21,16 +21,6 @@ using web::WebAnswer;
 // Further away from all keyframes, a small rotation would displace the anchor too far.
 constexpr double kMaxFromKeyframe_m = 1000;
 
-// Whether the journal's edit is the requested one: another tool of agent 0 may have used the same
-// revision.
-bool IsSame(const AnchorEdit& a, const AnchorEdit& b) {
-  return a.deleted == b.deleted && a.name == b.name && a.payload == b.payload &&
-         a.placement == b.placement &&
-         (a.placement == AnchorEdit::Placement::kSame ||
-          (a.map == b.map && a.keyframe_seq == b.keyframe_seq && a.utime == b.utime &&
-           a.T_ref_anchor.t.isApprox(b.T_ref_anchor.t, 1e-6) && a.pixel.isApprox(b.pixel, 1e-4)));
-}
-
 }  // namespace
 
 void AnchorApi::Tick(int64_t now_utime, bool complete) {
@@ -82,7 +72,7 @@ WebAnswer AnchorApi::Outcome(const AnchorEdit& ours, const AnchorEdit& journalle
   if (!anchor) {
     return Error(410, "somebody deleted this anchor meanwhile");
   }
-  if (!IsSame(ours, journalled) || anchor->state.edited_by != ours.agent_id ||
+  if (!IsSameChange(ours, journalled) || anchor->state.edited_by != ours.agent_id ||
       anchor->state.revision != ours.revision) {
     return Error(409, fmt::format("agent {} changed this anchor meanwhile: it has revision {} now",
                                   anchor->state.edited_by, anchor->state.revision));

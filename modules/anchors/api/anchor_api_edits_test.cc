@@ -129,6 +129,14 @@ TEST_F(AnchorApiTest, WhoeverLosesToAnotherIsToldSo) {
   other_tool.name = "other tool";
   Journal(other_tool);
   EXPECT_EQ(again->status, 409);
+  const auto moved = Ask(
+      "PUT", target,
+      fmt::format(R"({{"pose": {{"keyframe": {{"map": "{}", "seq": 3}}, "position": [1, 0, 0]}}}})",
+                  ToString(map(0))));
+  other_tool = requested_.back();
+  other_tool.T_ref_anchor.q = YawRotation(1);
+  Journal(other_tool);
+  EXPECT_EQ(moved->status, 409) << "the anchor looks elsewhere";
 }
 
 TEST_F(AnchorApiTest, DeletedForEver) {
