@@ -36,8 +36,13 @@ export class Camera {
     const video = document.createElement("video");
     video.playsInline = video.muted = true;
     video.srcObject = stream;
-    await video.play();
     const camera = new Camera(stream, video);
+    try {
+      await video.play();
+    } catch (error) {
+      camera.stop();
+      throw error;
+    }
     setTimeout(() => void camera.lock(), kSettle_ms);
     if ("MediaStreamTrackProcessor" in window) void camera.readTrack();
     else camera.readVideo();

@@ -1,0 +1,24 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { Camera } from "./camera";
+
+// A browser whose camera is allowed, and whose video does as it is told.
+function installBrowser(play: () => Promise<void>) {
+  const track = { label: "back", readyState: "live", stop: () => (track.readyState = "ended") };
+  const stream = { getTracks: () => [track], getVideoTracks: () => [track] };
+  const globals = {
+    navigator: { mediaDevices: { getUserMedia: async () => stream } },
+    document: { createElement: () => ({ play, requestVideoFrameCallback: () => 0 }) },
+    window: {},
+  };
+  for (const [name, value] of Object.entries(globals)) Object.defineProperty(globalThis, name, { value, configurable: true });
+  return track;
+}
+
+test("a camera that gives no video is not left open", async () => {
+  const track = installBrowser(async () => {
+    throw new DOMException("interrupted by a new load request", "AbortError");
+  });
+  await assert.rejects(Camera.open(), /interrupted/);
+  assert.equal(track.readyState, "ended");
+});
