@@ -13,6 +13,7 @@ import { Camera } from "./sensors/camera";
 import { askForMotion } from "./sensors/motion";
 import { parseCamera } from "./view/camera_model";
 import type { Stage } from "./view/stage";
+import { WakeLock } from "./wake_lock";
 import { Walk } from "./walk";
 import type { WalkEvents } from "./walk";
 import { XrOdometry } from "./xr/xr_odometry";
@@ -36,6 +37,7 @@ export class Visit {
   skipCalibration?: () => void; // set if the visitor may continue without calibration
   isLive = false;
   playedShare = 0; // of a recording
+  private readonly wakeLock = new WakeLock();
   private camera?: CameraKind; // the newest live one
   private xr?: XrOdometry;
   private xrFails = false;
@@ -71,6 +73,7 @@ export class Visit {
 
   leave() {
     this.supersede();
+    this.wakeLock.release();
     this.walk?.stop();
     this.stage.clear();
     this.events.onLeave();
@@ -88,7 +91,7 @@ export class Visit {
   onVisibility(isHidden: boolean) {
     if (!this.walk || !this.isLive) return;
     if (isHidden) this.walk.endMap();
-    else void keepAwake();
+    else this.wakeLock.keep();
   }
 
   // Stores a sensor.yaml of this phone's camera, as pangea-calibrate writes it.
@@ -133,7 +136,7 @@ export class Visit {
     const sensor = await Camera.open();
     if (run !== this.run) return sensor.stop();
     this.camera = sensor.kind;
-    void keepAwake();
+    this.wakeLock.keep();
     const cameraYaml = storedCalibration(this.camera) ?? (await this.calibrateLive(sensor, this.camera));
     if (!cameraYaml) return;
     if (run !== this.run) return sensor.stop();
@@ -177,7 +180,7 @@ export class Visit {
     };
     const membership = await this.admit();
     if (run !== this.run) return true;
-    void keepAwake();
+    this.wakeLock.keep();
     this.isLive = true;
     device.onCamera = async (cameraYaml) => {
       const newest = ++this.run; // a screen that is rotated there and back starts two walks
@@ -220,8 +223,4 @@ export class Visit {
       this.calibration = this.skipCalibration = undefined;
     }
   }
-}
-
-async function keepAwake() {
-  await navigator.wakeLock?.request("screen").catch(() => {});
 }

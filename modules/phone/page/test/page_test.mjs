@@ -218,7 +218,7 @@ async function testRecording(page) {
   return zip;
 }
 
-// Keeps the streams of cameras; `whileOpening` is called while one is being opened. `asSafari`: images come as in Safari and Firefox.
+// Keeps the streams of cameras, and counts the requests to keep the screen on; `whileOpening` is called while one is being opened. `asSafari`: images come as in Safari and Firefox.
 function watchCameras({ asSafari }) {
   if (asSafari) delete window.MediaStreamTrackProcessor;
   const devices = navigator.mediaDevices;
@@ -231,6 +231,9 @@ function watchCameras({ asSafari }) {
     return stream;
   };
   window.numCameras = () => window.streams.filter(({ active }) => active).length;
+  window.numAwake = 0;
+  const request = async () => (++window.numAwake, { release: async () => void --window.numAwake });
+  Object.defineProperty(navigator, "wakeLock", { value: { request } });
   window.rotate = () => screen.orientation.dispatchEvent(new Event("change"));
 }
 
@@ -249,6 +252,7 @@ async function testInterruptions(browser, url) {
   await hasOneNewAgent(page, "an agent to be interrupted starts");
   await recordsUntil(page, "a rotated screen", () => page.evaluate(() => rotate()));
   await hasOneNewAgent(page, "and starts anew");
+  check("the screen is kept on, once", (await page.evaluate(() => numAwake)) === 1);
   await recordsUntil(page, "a failure", () => page.evaluate(() => pangea.walk.removeAnchor("breaks")));
   await becomes(page, "and leads back", () => document.getElementById("welcome").checkVisibility());
   await page.locator("#start").click();
@@ -267,6 +271,8 @@ async function testInterruptions(browser, url) {
   await page.waitForTimeout(1000);
   check("and stays there, without camera and agent", page.workers().length === 0 &&
     (await page.evaluate(() => numCameras() === 0 && document.getElementById("welcome").checkVisibility())));
+  check("and the screen may go off", (await page.evaluate(() => numAwake)) === 0);
+  await testDamagedCalibration(page);
   await page.close();
 }
 
