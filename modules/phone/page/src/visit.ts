@@ -18,6 +18,8 @@ import { Walk } from "./walk";
 import type { WalkEvents } from "./walk";
 import { XrOdometry } from "./xr/xr_odometry";
 
+const kNotKept = "This browser does not keep the calibration.";
+
 export interface VisitEvents {
   onEnter(): void; // from now on a camera image is shown
   onLeave(): void;
@@ -102,7 +104,7 @@ export class Visit {
     if (width !== camera.width || height !== camera.height) {
       throw new Error(`sensor.yaml: field 'resolution' is ${width} x ${height}, the camera gives ${camera.width} x ${camera.height}`);
     }
-    storeCalibration(camera, yaml);
+    if (!storeCalibration(camera, yaml)) throw new Error(kNotKept);
   }
 
   // A start that fails leads back, unless it was overtaken: then nobody waits for it, and the newer walk goes on.
@@ -199,7 +201,7 @@ export class Visit {
     const walk = CalibrationWalk.live(sensor, parseCamera(rough, "rough"), this.stage);
     const cameraYaml = await this.calibrate(walk, rough).catch((error) => (sensor.stop(), Promise.reject(error)));
     if (!cameraYaml) sensor.stop();
-    else if (cameraYaml !== rough) storeCalibration(kind, cameraYaml);
+    else if (cameraYaml !== rough && !storeCalibration(kind, cameraYaml)) this.events.onNotice(kNotKept);
     return cameraYaml;
   }
 

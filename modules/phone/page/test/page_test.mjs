@@ -288,16 +288,25 @@ async function recordsUntil(page, what, end) {
 
 // The visitor taps Start twice, and the browser stores nothing and gives images as Safari does. The code of the invite works only once.
 async function testJoining(browser, url) {
-  const page = await openPage(browser, `${url}#join=ABCD-EFGH`, kPhone, (page) => page.addInitScript(watchCameras, { asSafari: true }));
+  const page = await openPage(browser, `${url}#join=ABCD-EFGH`, kPhone, async (page) => {
+    await page.addInitScript(watchCameras, { asSafari: true });
+    await page.addInitScript(() => Object.defineProperty(window, "localStorage", { get: () => { throw new DOMException("denied", "SecurityError"); } }));
+  });
   const answers = [{ json: { agent: 2, key: "ab".repeat(32), site: "hall" } }];
   await page.route("**/v1/join", (route) => route.fulfill(answers.pop() ?? { status: 403, json: { error: "used already" } }));
   const noStorage = "indexedDB.open = () => { throw new Error('no storage'); };\n";
   const body = noStorage + (await readFile(kFake, "utf8"));
   await page.route("**/pangea_agent.mjs", (route) => route.fulfill({ contentType: "text/javascript", body }));
   await senseMotion(page);
-  await page.evaluate(() => document.getElementById("join").requestSubmit());
+  await page.evaluate(() => {
+    window.notices = [];
+    const notice = document.getElementById("notice");
+    new MutationObserver(() => window.notices.push(notice.textContent)).observe(notice, { childList: true });
+    document.getElementById("join").requestSubmit();
+  });
   check("Start cannot be tapped twice", await page.locator("#start").isDisabled());
   await page.evaluate(() => document.getElementById("join").requestSubmit());
+  await becomes(page, "without storage a visitor is told that the key is lost", () => notices.some((text) => /does not keep your key/.test(text)));
   await page.locator("#skip").click();
   await becomes(page, "without storage a member is told so", () => /does not keep what is unsent: .*no storage/.test(document.getElementById("notice").textContent));
   await hasOneNewAgent(page, "and walks, with images as in Safari");

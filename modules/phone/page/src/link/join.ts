@@ -1,6 +1,7 @@
 // Joining a site: a one-time code is exchanged for an agent's key, which is kept in this browser's storage.
 
 import type { Membership } from "../messages";
+import { forget, store, stored } from "../storage";
 
 const kStorageKey = "pangea.membership";
 
@@ -10,7 +11,7 @@ export function codeIn(hash: string): string | undefined {
 }
 
 // The stored membership; undefined if there is none or it is not valid.
-export function parseMembership(json: string | null): Membership | undefined {
+export function parseMembership(json: string | undefined): Membership | undefined {
   try {
     const { agent, key, site, name } = JSON.parse(json ?? "null") ?? {};
     const good = Number.isInteger(agent) && agent >= 1 && agent <= 65535 && /^[0-9a-f]{64}$/.test(key);
@@ -20,8 +21,10 @@ export function parseMembership(json: string | null): Membership | undefined {
   }
 }
 
-export const storedMembership = () => parseMembership(localStorage.getItem(kStorageKey));
-export const forgetMembership = () => localStorage.removeItem(kStorageKey);
+export const storedMembership = () => parseMembership(stored(kStorageKey));
+export const forgetMembership = () => forget(kStorageKey);
+// False if the browser does not keep it.
+export const keepMembership = (membership: Membership) => store(kStorageKey, JSON.stringify(membership));
 
 // Throws an error with the server's text for the visitor.
 export async function join(code: string, name: string): Promise<Membership> {
@@ -34,6 +37,5 @@ export async function join(code: string, name: string): Promise<Membership> {
   if (!answer.ok) throw new Error(said.error ?? `The server does not answer (${answer.status}).`);
   const membership = parseMembership(JSON.stringify({ ...said, name }));
   if (!membership) throw new Error("The server's answer has no key in it.");
-  localStorage.setItem(kStorageKey, JSON.stringify(membership));
   return membership;
 }

@@ -20,7 +20,7 @@ test("the code is in the fragment, or there is none", () => {
 test("storage that somebody else wrote is no membership", () => {
   const good = { agent: 7, key: "ab".repeat(32), site: "hall", name: "Anna" };
   assert.deepEqual(parseMembership(JSON.stringify(good)), good);
-  for (const bad of [null, "", "no json", "null", JSON.stringify({ ...good, agent: 0 }), JSON.stringify({ ...good, key: "ab" })]) {
+  for (const bad of [undefined, "", "no json", "null", JSON.stringify({ ...good, agent: 0 }), JSON.stringify({ ...good, key: "ab" })]) {
     assert.equal(parseMembership(bad), undefined);
   }
 });

@@ -1,6 +1,7 @@
 // The calibration of this phone's camera: the stored one, or a rough one for any phone, with standard deviations that are
 // large enough.
 
+import { forget, store, stored, storedKeys } from "../storage";
 import { cameraInBody } from "./axes";
 
 export interface CameraKind {
@@ -18,14 +19,15 @@ const kCentreSigma = 0.01;
 const kPrefix = "pangea.calibration.";
 const keyOf = ({ label, width, height, angle_deg }: CameraKind) => `${kPrefix}${label}.${width}x${height}.${angle_deg}`;
 
-export const storedCalibration = (kind: CameraKind) => localStorage.getItem(keyOf(kind)) ?? undefined;
-export const storeCalibration = (kind: CameraKind, cameraYaml: string) => localStorage.setItem(keyOf(kind), cameraYaml);
+export const storedCalibration = (kind: CameraKind) => stored(keyOf(kind));
+// False if the browser does not keep it.
+export const storeCalibration = (kind: CameraKind, cameraYaml: string) => store(keyOf(kind), cameraYaml);
 
-export const storedCalibrations = () => Object.keys(localStorage).filter((key) => key.startsWith(kPrefix)).length;
+export const storedCalibrations = () => storedKeys(kPrefix).length;
 
 // Forgets the calibrations of all cameras.
 export function forgetCalibrations() {
-  for (const key of Object.keys(localStorage)) if (key.startsWith(kPrefix)) localStorage.removeItem(key);
+  for (const key of storedKeys(kPrefix)) forget(key);
 }
 
 // The rough calibration as the text of a cam0/sensor.yaml.

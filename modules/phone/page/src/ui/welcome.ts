@@ -1,9 +1,10 @@
 // The panel before a walk: who the visitor is, and joining.
 
 import { byId } from "../dom";
-import { codeIn, forgetMembership, join, storedMembership } from "../link/join";
+import { codeIn, forgetMembership, join, keepMembership, storedMembership } from "../link/join";
 import type { Membership } from "../messages";
 import { forgetCalibrations, storedCalibrations } from "../sensors/calibration";
+import { notice } from "./notice";
 
 const codeField = () => byId<HTMLInputElement>("code");
 
@@ -34,6 +35,7 @@ export class Welcome {
     const code = codeField().value.trim();
     if (code === "") return;
     this.membership = await join(code, byId<HTMLInputElement>("name").value.trim());
+    if (!keepMembership(this.membership)) notice("This browser does not keep your key: it is lost when you close the page.");
     // A reloaded page must not offer the code again.
     history.replaceState(null, "", location.pathname);
     codeField().value = "";
