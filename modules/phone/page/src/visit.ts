@@ -136,14 +136,22 @@ export class Visit {
     const membership = await this.begin(run, true);
     if (run !== this.run) return;
     const sensor = await Camera.open();
-    if (run !== this.run) return sensor.stop();
-    this.camera = sensor.kind;
-    this.wakeLock.keep();
-    const cameraYaml = storedCalibration(this.camera) ?? (await this.calibrateLive(sensor, this.camera));
-    if (!cameraYaml) return;
-    if (run !== this.run) return sensor.stop();
-    this.walk = Walk.live(sensor, cameraYaml, membership, this.stage, this.walkEvents);
+    try {
+      const cameraYaml = run === this.run ? await this.calibrationOf(sensor) : undefined;
+      if (!cameraYaml || run !== this.run) return sensor.stop();
+      this.walk = Walk.live(sensor, cameraYaml, membership, this.stage, this.walkEvents);
+    } catch (error) {
+      sensor.stop();
+      throw error;
+    }
     this.events.onEnter();
+  }
+
+  // The stored one, or a new one; undefined if the start was overtaken or left.
+  private async calibrationOf(sensor: Camera): Promise<string | undefined> {
+    const kind = (this.camera = sensor.kind);
+    this.wakeLock.keep();
+    return storedCalibration(kind) ?? (await this.calibrateLive(sensor, kind));
   }
 
   private async openRecorded(run: number, files: Files) {
@@ -199,9 +207,9 @@ export class Visit {
   private async calibrateLive(sensor: Camera, kind: CameraKind): Promise<string | undefined> {
     const rough = roughCalibration(kind);
     const walk = CalibrationWalk.live(sensor, parseCamera(rough, "rough"), this.stage);
-    const cameraYaml = await this.calibrate(walk, rough).catch((error) => (sensor.stop(), Promise.reject(error)));
-    if (!cameraYaml) sensor.stop();
-    else if (cameraYaml !== rough && !storeCalibration(kind, cameraYaml)) this.events.onNotice(kNotKept);
+    const cameraYaml = await this.calibrate(walk, rough);
+    const isNew = cameraYaml !== undefined && cameraYaml !== rough;
+    if (isNew && !storeCalibration(kind, cameraYaml)) this.events.onNotice(kNotKept);
     return cameraYaml;
   }
 

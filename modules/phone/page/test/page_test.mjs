@@ -276,6 +276,18 @@ async function testInterruptions(browser, url) {
   await page.close();
 }
 
+// A stored calibration of the camera that is damaged. The visitor can make it anew.
+async function testDamagedCalibration(page) {
+  await page.evaluate(() => {
+    window.whileOpening = undefined;
+    for (const key of Object.keys(localStorage)) if (key.startsWith("pangea.calibration.")) localStorage.setItem(key, "resolution: 7");
+  });
+  await page.locator("#start").click();
+  await becomes(page, "a damaged calibration is named", () =>
+    /^the stored calibration: field/.test(document.getElementById("notice").textContent) && document.getElementById("recalibrate").checkVisibility());
+  check("and the camera is closed", (await page.evaluate(() => numCameras())) === 0);
+}
+
 // What ends a walk saves its recording.
 async function recordsUntil(page, what, end) {
   await page.locator("#record").click();
