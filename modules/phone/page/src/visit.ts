@@ -183,10 +183,10 @@ export class Visit {
     if (run !== this.run) return device.stop(), true;
     this.xr = device;
     device.onEnd = () => {
-      if (!device.hasCamera) this.xrFails = true;
       if (this.xr !== device) return;
       this.leave();
-      if (this.xrFails) this.events.onNotice("AR gives no camera images here. Start again: the page tracks by itself then.");
+      this.xrFails = device.isBlind;
+      if (device.isBlind) this.events.onNotice("AR gives no camera images here. Start again: the page tracks by itself then.");
     };
     const membership = await this.admit();
     if (run !== this.run) return true;

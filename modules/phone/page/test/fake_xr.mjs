@@ -1,6 +1,6 @@
 // A fake of WebXR for tests: an immersive-ar session with camera-access and dom-overlay, as specified. The test provides what it sees:
 // window.xrSource(time_ms) gives {picture, width, height, projection, position, orientation}; while the device is lost, only
-// `picture`. It shows the picture behind the page, as a device does.
+// `picture`. With window.xrBlind its views have no camera. It shows the picture behind the page, as a device does.
 
 export function installFakeXr({ refusedFeature, frame_ms }) {
   const refuse = (name, text) => Promise.reject(new DOMException(text, name));
@@ -62,7 +62,7 @@ export function installFakeXr({ refusedFeature, frame_ms }) {
         get camera() {
           if (!frame.active) throw new DOMException("the frame is over", "InvalidStateError");
           const { width, height } = frame.seen;
-          return frame.session.features.includes("camera-access") ? { width, height, frame } : null;
+          return frame.session.features.includes("camera-access") && !window.xrBlind ? { width, height, frame } : null;
         },
       };
       return { emulatedPosition: false, transform: view.transform, views: [view] };

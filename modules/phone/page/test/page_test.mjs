@@ -379,6 +379,7 @@ async function testXr(browser, url) {
     const half = Math.SQRT1_2;
     window.xrSource = () => ({ ...lens, ...window.xrSize, ...(!window.xrLost && { position: { x: 0, y: 1.5, z: 0 }, orientation: { x: 0, y: half, z: 0, w: half } }) });
   }, projectionOf({ width: 960, height: 1280, focal: 1000 }));
+  await stopBeforeFirstImage(page);
   await page.locator("#start").click();
   await becomes(page, "WebXR: the device's images reach the agent", () => pangea.walk?.vio?.counters.images > 5);
   const { cameraYaml, edges } = await told(page);
@@ -399,6 +400,29 @@ async function testXr(browser, url) {
   await page.locator("#stop").click();
   check("stopping ends the session", (await page.locator("#welcome").isVisible()) && (await page.evaluate(() => xrSession.ended)));
   await page.close();
+}
+
+// Only what reads the device's camera has samplers.
+function countSamplers() {
+  window.numSamplers = 0;
+  const { prototype } = WebGL2RenderingContext;
+  for (const [name, more] of [["createSampler", 1], ["deleteSampler", -1]]) {
+    const real = prototype[name];
+    prototype[name] = function (...given) {
+      window.numSamplers += more;
+      return real.apply(this, given);
+    };
+  }
+}
+
+// Stop in AR before the first image does not mean that AR gives no images.
+async function stopBeforeFirstImage(page) {
+  await page.evaluate(() => (window.xrLost = true));
+  await page.locator("#start").click();
+  await becomes(page, "WebXR: one waits until AR finds its way", () => /AR finds its way/.test(document.getElementById("hint").textContent));
+  await page.locator("#stop").click();
+  check("and may stop", await page.evaluate(() => xrSession.ended && document.getElementById("welcome").checkVisibility()));
+  await page.evaluate(() => (window.xrLost = false));
 }
 
 // The screen is rotated there and back while the first agent ends, which takes a second here.
@@ -425,6 +449,22 @@ async function testXrRefused(browser, url) {
   await page.close();
 }
 
+// AR starts, but gives no camera images.
+async function testXrBlind(browser, url) {
+  const page = await openPage(browser, url, { viewport: { width: 360, height: 480 }, permissions: ["camera", "accelerometer", "gyroscope"] }, (page) => page.addInitScript(installFakeXr, { frame_ms: 33 }));
+  await senseMotion(page);
+  await page.evaluate((projection) => {
+    window.xrBlind = true;
+    window.xrSource = () => ({ width: 960, height: 1280, projection, position: { x: 0, y: 0, z: 0 }, orientation: { x: 0, y: 0, z: 0, w: 1 } });
+  }, projectionOf({ width: 960, height: 1280, focal: 1000 }));
+  await page.locator("#start").click();
+  await becomes(page, "AR without camera images ends, and the page says so", () =>
+    /AR gives no camera images/.test(document.getElementById("notice").textContent) && document.getElementById("welcome").checkVisibility());
+  await page.locator("#start").click();
+  await becomes(page, "the next start uses the page's own odometry", () => Boolean(pangea.calibration));
+  await page.close();
+}
+
 async function testRefusals(browser, url) {
   const page = await openPage(browser, `${url}#join=ABCD-EFGH`);
   check("the code of the link is there", (await page.locator("#code").inputValue()) === "ABCD-EFGH");
@@ -445,6 +485,7 @@ await run(async () => {
   await testBroken(browser, url, zip);
   await testXr(browser, url);
   await testXrRefused(browser, url);
+  await testXrBlind(browser, url);
   await testRefusals(browser, url);
   await browser.close();
 });

@@ -28,7 +28,8 @@ export class XrOdometry {
   onImage?: (image: XrImage) => void;
   onFrame?: (frame: XrFrame) => void;
   onCamera?: (cameraYaml: string) => void; // called before the first image and when the screen was rotated
-  onEnd?: () => void; // the session has ended, or gives no images
+  onEnd?: () => void; // the session has ended
+  isBlind = false; // it was ended because it gives no camera images
   private readonly readback: CameraReadback;
   private readonly binding: XRWebGLBinding;
   private readonly target: WebGLRenderTarget;
@@ -80,10 +81,6 @@ export class XrOdometry {
     this.session.requestAnimationFrame(this.onAnimationFrame);
   }
 
-  get hasCamera(): boolean {
-    return this.size !== undefined;
-  }
-
   stop() {
     this.session.end().catch(() => {});
     this.end();
@@ -101,7 +98,10 @@ export class XrOdometry {
     this.giveImage();
     const pose = frame.getViewerPose(this.space);
     const view = pose?.views.find(({ camera }) => camera);
-    if (pose && !view && !this.size && time_ms - (this.blindSince_ms ??= time_ms) > kNoCamera_ms) return this.stop();
+    if (pose && !view && !this.size && time_ms - (this.blindSince_ms ??= time_ms) > kNoCamera_ms) {
+      this.isBlind = true;
+      return this.stop();
+    }
     if (!pose || pose.emulatedPosition || !view) return this.giveLost(time_ms);
     const T_odom_body = odomPose(view.transform);
     this.readImage(time_ms, view, T_odom_body);
