@@ -14,10 +14,12 @@ export class AgentClient {
   private readonly worker = new Worker(new URL("./worker.ts", import.meta.url), { type: "module" });
 
   private closed = () => {};
+  private closing?: Promise<void>;
 
-  constructor(open: OpenAgent, onMessage: (message: FromWorker) => void) {
-    this.worker.onmessage = ({ data }: MessageEvent<FromWorker>) => (data.kind === "closed" ? this.closed() : onMessage(data));
-    this.worker.onerror = ({ message }) => onMessage({ kind: "failed", text: message || "The agent's script cannot be loaded." });
+  // `onMessage` gets at most one failure, and none after close().
+  constructor(open: OpenAgent, private readonly onMessage: (message: FromWorker) => void) {
+    this.worker.onmessage = ({ data }: MessageEvent<FromWorker>) => this.take(data);
+    this.worker.onerror = ({ message }) => this.take({ kind: "failed", text: message || "The agent's script cannot be loaded." });
     this.say(open);
   }
 
@@ -36,10 +38,24 @@ export class AgentClient {
   }
 
   // Resolves when all unsent keyframes are stored.
-  async close(): Promise<void> {
+  close(): Promise<void> {
+    return (this.closing ??= this.end());
+  }
+
+  private async end() {
     const closed = new Promise<void>((done) => (this.closed = done));
     this.say({ kind: "close" });
     await Promise.race([closed, new Promise((done) => setTimeout(done, kLongestClose_ms))]);
     this.worker.terminate();
+  }
+
+  // An agent that has failed is closed at once, because it would fail again and again.
+  private take(message: FromWorker) {
+    if (message.kind === "closed") return this.closed();
+    if (message.kind === "failed") {
+      if (this.closing) return;
+      void this.close();
+    }
+    this.onMessage(message);
   }
 }

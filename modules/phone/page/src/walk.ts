@@ -38,7 +38,6 @@ export class Walk {
   recorder?: Recorder;
   private stopSensors = () => {};
   private readonly client: AgentClient;
-  private closing?: Promise<void>;
   private taken = () => {}; // called when the agent has processed its image
 
   private constructor(
@@ -117,10 +116,9 @@ export class Walk {
     this.endMap();
   }
 
-  // Starts that overlap close the same walk; they all wait for the same end.
   close(): Promise<void> {
     this.stopSensors();
-    return (this.closing ??= this.client.close());
+    return this.client.close();
   }
 
   startRecording() {

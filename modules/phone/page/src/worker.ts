@@ -40,7 +40,7 @@ class AgentHost {
     });
     const host = new AgentHost(agent, devicePoses ?? false);
     if (membership) await host.connect(membership.agent, membership.key);
-    host.polling = setInterval(() => host.take(agent.poll(now_us())), kPoll_ms);
+    host.polling = setInterval(() => host.poll(), kPoll_ms);
     return host;
   }
 
@@ -64,16 +64,27 @@ class AgentHost {
         this.take(this.agent.flush());
         return this.agent.startAnew();
       case "close":
-        return void this.close();
+        return void this.close().catch(fail);
     }
   }
 
   private async close() {
     clearInterval(this.polling);
-    this.take(this.agent.flush());
-    this.take(this.agent.poll(now_us()));
-    await this.stored;
-    say({ kind: "closed" });
+    try {
+      this.take(this.agent.flush());
+      this.take(this.agent.poll(now_us()));
+    } finally {
+      await this.stored;
+      say({ kind: "closed" });
+    }
+  }
+
+  private poll() {
+    try {
+      this.take(this.agent.poll(now_us()));
+    } catch (error) {
+      fail(error as Error);
+    }
   }
 
   private addImu(samples: Float64Array) {

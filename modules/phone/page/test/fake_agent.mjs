@@ -6,9 +6,11 @@ const kOther = [1, 4, 1.5]; // its camera looks along odom's -y
 const kMap = "1/1700000000000000";
 const half = Math.SQRT1_2;
 
-// Simulates a bug that the agent itself does not catch.
+// Simulates a bug that the agent itself does not catch. Afterwards the agent always fails, as WebAssembly does.
+let isBroken = false;
 function breakIfTold(text) {
-  if (/breaks/.test(text)) throw new Error("a bug");
+  isBroken ||= /breaks/.test(text);
+  if (isBroken) throw new Error("a bug");
 }
 
 class FakeAgent {
@@ -50,7 +52,9 @@ class FakeAgent {
   removeAnchor(id) {
     breakIfTold(id);
   }
-  poll() {}
+  poll() {
+    breakIfTold("");
+  }
   startAnew() {
     ++this.numMaps;
   }
