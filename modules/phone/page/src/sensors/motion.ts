@@ -1,4 +1,5 @@
-// Gives the device's motion as inertial samples in the body frame, at the 60 Hz of browsers.
+// Gives the device's motion as inertial samples in the body frame, at the 60 Hz of browsers. The first samples are left out, until it is
+// known which sign the platform gives to gravity.
 
 import type { ImuSample } from "../recording/euroc";
 import { GravitySign, toBody, upInBody } from "./axes";
@@ -6,6 +7,7 @@ import type { Vector3 } from "./axes";
 import { utimeOf } from "./clock";
 
 const kSilence_ms = 3000;
+const kLongestDecision_us = 1_000_000; // longest wait for the sign of gravity, because some phones give no orientation
 
 // Some browsers ask the user for permission; iOS only allows asking within a tap. The answer is not used: motion comes or not.
 type Asking = { requestPermission?: () => Promise<PermissionState> };
@@ -20,6 +22,7 @@ export async function askForMotion(): Promise<void> {
 export class Motion {
   private readonly sign = new GravitySign();
   private up?: Vector3;
+  private first?: number; // us
   private newest = 0;
   private readonly silence: ReturnType<typeof setTimeout>;
 
@@ -50,6 +53,7 @@ export class Motion {
     if (!known(acceleration) || !known(rate) || utime <= this.newest) return;
     this.newest = utime;
     if (this.up) this.sign.add(acceleration, this.up);
+    if (!this.sign.decided && utime - (this.first ??= utime) < kLongestDecision_us) return;
     this.onSample({ utime, ...toBody({ acceleration, rate }, this.sign.sign) });
   };
 }
