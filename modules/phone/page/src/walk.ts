@@ -61,6 +61,7 @@ export class Walk {
     walk.stopSensors = () => {
       camera.stop();
       motion.stop();
+      walk.frames.stop();
     };
     return walk;
   }
@@ -72,7 +73,10 @@ export class Walk {
     walk.taken = () => images.done();
     device.onImage = (image) => images.add(image);
     device.onFrame = (frame) => walk.showThrough(frame);
-    walk.stopSensors = () => (device.onImage = device.onFrame = undefined);
+    walk.stopSensors = () => {
+      device.onImage = device.onFrame = undefined;
+      images.stop();
+    };
     return walk;
   }
 
@@ -93,7 +97,7 @@ export class Walk {
     };
     const player = new Player(recording, sink, realTime);
     walk.stopSensors = () => player.stop();
-    player.play(onImage).then(() => walk.endMap(), (error) => events.onFailure(error.message));
+    player.play(onImage).then(() => walk.endMap(), (error) => player.isStopped || events.onFailure(error.message));
     return walk;
   }
 

@@ -51,6 +51,7 @@ export class CalibrationWalk {
     walk.stopSensors = () => {
       camera.onImage = undefined;
       motion.stop();
+      frames.stop();
     };
     return walk;
   }

@@ -19,7 +19,7 @@ interface PlayerSink {
 }
 
 export class Player {
-  private stopped = false;
+  isStopped = false;
 
   // Loads the image with this index; undefined if the browser cannot read it.
   static async load({ files, images }: Recording, index: number): Promise<RecordedPicture | undefined> {
@@ -37,7 +37,7 @@ export class Player {
   ) {}
 
   stop() {
-    this.stopped = true;
+    this.isStopped = true;
   }
 
   // Plays to the end, or until it is stopped. `onImage` gets the share that was played.
@@ -45,10 +45,11 @@ export class Player {
     const { images, imu } = this.recording;
     const began_ms = performance.now();
     let next = 0;
-    for (let i = 0; i < images.length && !this.stopped; ++i) {
+    for (let i = 0; i < images.length && !this.isStopped; ++i) {
       const { utime } = images[i];
       const image = await Player.load(this.recording, i);
       if (this.realTime) await until(began_ms + (utime - images[0].utime) / 1000);
+      if (this.isStopped) return image?.picture.close();
       const from = next;
       while (next < imu.length && imu[next].utime <= utime + kAhead_us) ++next;
       this.sink.addImu(imu.slice(from, next));

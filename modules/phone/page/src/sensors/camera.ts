@@ -114,7 +114,7 @@ export class Camera {
   private async giveFrame(utime: number, frame: VideoFrame) {
     const taken = Promise.all([lumaOfFrame(frame), createImageBitmap(frame)]);
     const [luma, picture] = await taken.finally(() => frame.close());
-    if (this.onImage) this.onImage({ utime, picture, ...luma });
+    if (this.onImage && !this.stopped) this.onImage({ utime, picture, ...luma });
     else picture.close();
   }
 }

@@ -36,3 +36,14 @@ test("nothing is given twice", () => {
   frames.done();
   assert.deepEqual(given, [1]);
 });
+
+test("when it is stopped, the agent gets no more, and all are freed", () => {
+  const { given, dropped, frames } = world();
+  frames.add({ utime: 1 });
+  frames.add({ utime: 2 });
+  frames.stop();
+  frames.done();
+  frames.add({ utime: 3 });
+  assert.deepEqual(given, [1]);
+  assert.deepEqual(dropped, [2, 3]);
+});

@@ -9,6 +9,7 @@ export class NewestFrame<F extends Stamped> {
   numDropped = 0;
   private waiting?: F;
   private atAgent = false;
+  private stopped = false;
 
   // `give` passes a frame to the agent, `drop` frees one.
   constructor(
@@ -17,6 +18,7 @@ export class NewestFrame<F extends Stamped> {
   ) {}
 
   add(frame: F) {
+    if (this.stopped) return this.drop(frame);
     if (this.waiting) {
       ++this.numDropped;
       this.drop(this.waiting);
@@ -29,6 +31,13 @@ export class NewestFrame<F extends Stamped> {
   done() {
     this.atAgent = false;
     this.next();
+  }
+
+  // From now on the agent gets no frame, also not the one that waits.
+  stop() {
+    this.stopped = true;
+    if (this.waiting) this.drop(this.waiting);
+    this.waiting = undefined;
   }
 
   private next() {
