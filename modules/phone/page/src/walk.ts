@@ -57,6 +57,7 @@ export class Walk {
     const model = parseCamera(cameraYaml, "the stored calibration");
     const walk = new Walk(model, { camera: cameraYaml, imu: kPhoneImu }, membership, stage, events);
     camera.onImage = (image) => walk.onCamera(image);
+    camera.onEnd = ({ message }) => events.onFailure(message);
     const motion = new Motion((sample) => walk.addImu(sample), () => (walk.motionSilent = true));
     walk.stopSensors = () => {
       camera.stop();

@@ -257,6 +257,11 @@ async function testInterruptions(browser, url) {
   await becomes(page, "and leads back", () => document.getElementById("welcome").checkVisibility());
   await page.locator("#start").click();
   await hasOneNewAgent(page, "one can start again");
+  await recordsUntil(page, "a camera that is taken away", () => page.evaluate(() => streams.at(-1).getVideoTracks()[0].dispatchEvent(new Event("ended"))));
+  await becomes(page, "and leads back, and is named", () =>
+    document.getElementById("welcome").checkVisibility() && /took the camera away/.test(document.getElementById("notice").textContent));
+  await page.locator("#start").click();
+  await hasOneNewAgent(page, "after which one can start too");
   await recordsUntil(page, "Stop", () => page.locator("#stop").click());
 
   await page.locator("#start").click();

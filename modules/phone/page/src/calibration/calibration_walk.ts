@@ -47,6 +47,7 @@ export class CalibrationWalk {
     const frames = new NewestFrame<CameraImage>((image) => walk.give(image), ({ picture }) => picture.close());
     walk.taken = () => frames.done();
     camera.onImage = (image) => frames.add(image);
+    camera.onEnd = (why) => walk.fail(why);
     const motion = new Motion((sample) => walk.addImu([sample]), () => (walk.motionSilent = true));
     walk.stopSensors = () => {
       camera.onImage = undefined;

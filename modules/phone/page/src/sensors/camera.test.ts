@@ -4,7 +4,7 @@ import { Camera } from "./camera";
 
 // A browser whose camera is allowed, and whose video does as it is told.
 function installBrowser(play: () => Promise<void>) {
-  const track = { label: "back", readyState: "live", stop: () => (track.readyState = "ended") };
+  const track = { label: "back", readyState: "live", stop: () => (track.readyState = "ended"), addEventListener: () => {} };
   const stream = { getTracks: () => [track], getVideoTracks: () => [track] };
   const globals = {
     navigator: { mediaDevices: { getUserMedia: async () => stream } },

@@ -20,12 +20,17 @@ declare class MediaStreamTrackProcessor {
 
 export class Camera {
   onImage?: (image: CameraImage) => void; // without it images are dropped
+  onEnd?: (why: Error) => void; // the browser took the camera away
   private stopped = false;
 
   private constructor(
     private readonly stream: MediaStream,
     readonly video: HTMLVideoElement,
-  ) {}
+  ) {
+    this.track.addEventListener("ended", () => {
+      if (!this.stopped) this.onEnd?.(new Error("The browser took the camera away. Start again."));
+    });
+  }
 
   // Throws the browser's error: no camera, no permission.
   static async open(): Promise<Camera> {
