@@ -45,8 +45,12 @@ class AgentHost {
   }
 
   private async connect(agent: number, key: string) {
-    this.spool = await SpoolStore.open(`pangea.spool.${agent}`).catch(storageFailed);
-    if (this.spool) this.agent.restoreSpool(await this.spool.entries());
+    try {
+      this.spool = await SpoolStore.open(`pangea.spool.${agent}`);
+      this.agent.restoreSpool(await this.spool.entries());
+    } catch (error) {
+      storageFailed(error);
+    }
     this.link = new GatewayLink(gatewayOrigin(), agent, key, (packet) => this.agent.onLinkDown(packet));
   }
 

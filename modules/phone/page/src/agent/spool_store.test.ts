@@ -30,3 +30,18 @@ test("agents do not see each other's; what is not there may be deleted", async (
   await store.apply([remove("nobody")]);
   assert.deepEqual(await ids(store), []);
 });
+
+test("on a full disk nothing is put, but what the server has is deleted", async () => {
+  const store = await SpoolStore.open("d");
+  await store.apply([put("1", 1), put("2", 2)]);
+  const { put: realPut } = IDBObjectStore.prototype;
+  IDBObjectStore.prototype.put = function (this: IDBObjectStore, ...entry: Parameters<typeof realPut>) {
+    const request = realPut.apply(this, entry);
+    this.transaction.abort();
+    return request;
+  };
+  await assert.rejects(store.apply([remove("1"), put("3", 3)])).finally(() => (IDBObjectStore.prototype.put = realPut));
+  assert.deepEqual(await ids(store), ["2"]);
+  await store.apply([put("4", 4)]);
+  assert.deepEqual(await ids(store), ["2", "4"]);
+});

@@ -36,8 +36,24 @@ export class SpoolStore {
     return all.sort((a, b) => a.order - b.order);
   }
 
-  // Applies all changes or none. Several calls take effect in their order.
+  // Applies all changes. If that fails, for instance on a full disk, only the deletions are applied, because they make room. Several calls
+  // take effect in their order.
   async apply(changes: SpoolChange[]): Promise<void> {
+    try {
+      await this.write(changes);
+    } catch (error) {
+      await this.write(changes.filter(({ op }) => op === "delete"));
+      throw error;
+    }
+  }
+
+  close() {
+    this.database.close();
+  }
+
+  // Writes all or nothing.
+  private async write(changes: SpoolChange[]): Promise<void> {
+    if (changes.length === 0) return;
     const transaction = this.database.transaction(kStore, "readwrite");
     const store = transaction.objectStore(kStore);
     for (const { op, id, bytes } of changes) {
@@ -48,9 +64,5 @@ export class SpoolStore {
       transaction.oncomplete = resolve;
       transaction.onabort = () => reject(transaction.error);
     });
-  }
-
-  close() {
-    this.database.close();
   }
 }
