@@ -8,7 +8,7 @@ const kMaxEncoding = 4; // images encoded at once; further ones are left out and
 const kQuality = 0.92;
 
 export class Recorder {
-  numLeftOut = 0;
+  numLeftOut = 0; // images
   private readonly writer: RecordingWriter;
   private readonly encoding = new Set<Promise<void>>();
 
@@ -36,7 +36,8 @@ export class Recorder {
     }
     const canvas = new OffscreenCanvas(width, height);
     canvas.getContext("2d")!.drawImage(picture, 0, 0, width, height);
-    const task: Promise<void> = this.encode(canvas, utime).finally(() => this.encoding.delete(task));
+    const leaveOut = () => void ++this.numLeftOut;
+    const task: Promise<void> = this.encode(canvas, utime).catch(leaveOut).finally(() => this.encoding.delete(task));
     this.encoding.add(task);
   }
 
