@@ -1,5 +1,5 @@
 import assert from "node:assert/strict";
-import { test } from "node:test";
+import { mock, test } from "node:test";
 import { proofOf } from "./gateway_link";
 import { uploadRecording } from "./upload";
 
@@ -19,7 +19,9 @@ class FakeSocket {
   send(message: Uint8Array | ArrayBuffer) {
     this.sent.push(new Uint8Array(message));
   }
-  close() {}
+  close() {
+    this.readyState = 3;
+  }
   says(message: Uint8Array<ArrayBuffer>) {
     this.onmessage?.({ data: message.buffer });
   }
@@ -76,4 +78,20 @@ test("what the server says against it is the visitor's to read", () => withSocke
   const lost = uploadRecording("wss://server", kMembership, new Blob(["zip"]), () => {});
   FakeSocket.last.ends(1006, "");
   await assert.rejects(lost, /connection was lost/);
+}));
+
+test("a server that says nothing for a minute is lost", () => withSocket(async () => {
+  mock.timers.enable({ apis: ["setTimeout"] });
+  let said = "";
+  const lost = uploadRecording("wss://server", kMembership, new Blob(["zip"]), () => {}).catch((error) => (said = error.message));
+  mock.timers.tick(59_000);
+  FakeSocket.last.says(new Uint8Array(32));
+  mock.timers.tick(59_000);
+  await new Promise((done) => setImmediate(done));
+  assert.equal(said, "");
+  mock.timers.tick(1_000);
+  await lost;
+  assert.equal(said, "the connection was lost");
+  assert.equal(FakeSocket.last.readyState, 3);
+  mock.timers.reset();
 }));

@@ -6,7 +6,9 @@ import { proofOf } from "./gateway_link";
 
 const kMessage_bytes = 60_000;
 const kWindow_bytes = 1_000_000;
+const kSilent_ms = 60_000; // the server answers everything; at the end it first writes the recording to its disk
 const kKept = 4200; // close code; the reason is the file's name
+const kLost = "the connection was lost";
 
 class Upload {
   private proven = false;
@@ -56,9 +58,25 @@ export function uploadRecording(origin: string, membership: Membership, zip: Blo
     const socket = new WebSocket(`${origin}/recording?agent=${membership.agent}`);
     socket.binaryType = "arraybuffer";
     const upload = new Upload(socket, membership, zip, onProgress);
-    socket.onmessage = ({ data }: MessageEvent<ArrayBuffer>) => {
-      upload.take(data).catch((error) => (socket.close(), failed(error)));
+    const fail = (error: Error) => {
+      clearTimeout(silence);
+      socket.close();
+      failed(error);
     };
-    socket.onclose = ({ code, reason }) => (code === kKept ? done(reason) : failed(new Error(reason || "the connection was lost")));
+    let silence: ReturnType<typeof setTimeout>;
+    const listen = () => {
+      clearTimeout(silence);
+      silence = setTimeout(() => fail(new Error(kLost)), kSilent_ms);
+    };
+    listen();
+    socket.onmessage = ({ data }: MessageEvent<ArrayBuffer>) => {
+      listen();
+      upload.take(data).catch(fail);
+    };
+    socket.onclose = ({ code, reason }) => {
+      clearTimeout(silence);
+      if (code === kKept) done(reason);
+      else failed(new Error(reason || kLost));
+    };
   });
 }
