@@ -372,7 +372,10 @@ async function testPlaying(browser, url, zip) {
 
 // A device with its own odometry looks along odom's y from a height of 1.5 m; the lower and the right part of its image are darker.
 async function testXr(browser, url) {
-  const page = await openPage(browser, url, { viewport: { width: 360, height: 480 }, permissions: ["camera", "accelerometer", "gyroscope"] }, (page) => page.addInitScript(installFakeXr, { frame_ms: 33 }));
+  const page = await openPage(browser, url, { viewport: { width: 360, height: 480 }, permissions: ["camera", "accelerometer", "gyroscope"] }, async (page) => {
+    await page.addInitScript(installFakeXr, { frame_ms: 33 });
+    await page.addInitScript(countSamplers);
+  });
   await page.evaluate((projection) => {
     const picture = new OffscreenCanvas(960, 1280);
     const context = picture.getContext("2d");
@@ -404,6 +407,7 @@ async function testXr(browser, url) {
   await testXrRotations(page);
   await page.locator("#stop").click();
   check("stopping ends the session", (await page.locator("#welcome").isVisible()) && (await page.evaluate(() => xrSession.ended)));
+  check("and frees what it had on the graphics card", (await page.evaluate(() => numSamplers)) === 0);
   await page.close();
 }
 

@@ -108,6 +108,19 @@ export class CameraReadback {
     gl.bindBuffer(gl.PIXEL_PACK_BUFFER, null);
     return { luma, size: pending.size };
   }
+
+  // Frees what it has on the graphics card; it must not be used any more.
+  dispose() {
+    const { gl } = this;
+    if (this.pending) gl.deleteSync(this.pending.done);
+    this.pending = undefined;
+    gl.deleteProgram(this.program);
+    gl.deleteSampler(this.sampler);
+    gl.deleteVertexArray(this.vertices);
+    gl.deleteFramebuffer(this.framebuffer);
+    gl.deleteTexture(this.grey);
+    gl.deleteBuffer(this.buffer);
+  }
 }
 
 function makeProgram(gl: WebGL2RenderingContext): WebGLProgram {
@@ -117,6 +130,7 @@ function makeProgram(gl: WebGL2RenderingContext): WebGLProgram {
     gl.shaderSource(shader, source);
     gl.compileShader(shader);
     gl.attachShader(program, shader);
+    gl.deleteShader(shader); // when the program is deleted
   }
   gl.linkProgram(program);
   if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(`camera's shader: ${gl.getProgramInfoLog(program)}`);

@@ -89,6 +89,8 @@ export class XrOdometry {
   private end() {
     if (this.ended) return;
     this.ended = true;
+    this.readback.dispose();
+    this.target.dispose();
     this.onEnd?.();
   }
 
