@@ -74,13 +74,19 @@ picture.addEventListener("click", ({ clientX, clientY }) => {
 // --- recordings, and calibrations of this phone's camera
 
 for (const what of ["folder", "zip"]) byId(`open_${what}`).onclick = () => byId(what).click();
+// The files that were chosen. The field is emptied, so that the same ones can be chosen again.
+function chosen(field: HTMLInputElement): File[] {
+  const files = [...(field.files ?? [])];
+  field.value = "";
+  return files;
+}
 byId<HTMLInputElement>("folder").onchange = ({ target }) => {
-  const files = [...((target as HTMLInputElement).files ?? [])];
+  const files = chosen(target as HTMLInputElement);
   const byPath = new Map(files.map((file) => [file.webkitRelativePath, file]));
   if (files.length > 0) attempt(visit.startRecorded(filesOf(byPath)));
 };
 byId<HTMLInputElement>("zip").onchange = ({ target }) => {
-  const [file] = (target as HTMLInputElement).files ?? [];
+  const [file] = chosen(target as HTMLInputElement);
   if (file) attempt(filesOfZip(file).then((files) => visit.startRecorded(files)));
 };
 addEventListener("dragover", (event) => event.preventDefault());

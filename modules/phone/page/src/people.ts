@@ -15,9 +15,7 @@ export class People {
   }
 
   private async refresh() {
-    const answer = await fetch("/v1/info").catch(() => undefined);
-    if (!answer?.ok) return;
-    const { agents } = await answer.json();
-    for (const { agent, name } of agents ?? []) this.names.set(agent, name);
+    const told = await fetch("/v1/info").then((answer) => (answer.ok ? answer.json() : undefined)).catch(() => undefined);
+    for (const { agent, name } of told?.agents ?? []) this.names.set(agent, name);
   }
 }

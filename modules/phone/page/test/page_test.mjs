@@ -479,6 +479,7 @@ async function testRefusals(browser, url) {
   check("the code of the link is there", (await page.locator("#code").inputValue()) === "ABCD-EFGH");
   await page.locator("#zip").setInputFiles({ name: "a.zip", mimeType: "application/zip", buffer: Buffer.from("no zip") });
   await becomes(page, "what is no zip is refused with words", () => /zip cannot be read/.test(document.getElementById("notice").textContent));
+  check("and can be chosen again", (await page.locator("#zip").inputValue()) === "");
   await page.close();
 }
 

@@ -121,7 +121,8 @@ class Session {
     if (played.length === 0) throw new Error(`no image from ${this.config.start_s} s on`);
     const { rate } = this.config;
     const began_ms = performance.now();
-    let next = imu.findIndex(({ utime }) => utime >= played[0].utime - kImuBeforeStart_us);
+    const from = imu.findIndex(({ utime }) => utime >= played[0].utime - kImuBeforeStart_us);
+    let next = from < 0 ? imu.length : from;
     for (const { utime, name } of played) {
       const due_ms = began_ms + (utime - played[0].utime) / 1000 / rate;
       if (rate > 0 && rate <= 1 && rate * (performance.now() - due_ms) > kMaxLag_ms) {
