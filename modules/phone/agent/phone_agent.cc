@@ -140,14 +140,35 @@ void PhoneAgent::OnPose(const pose_t& message) {
     pose.in_group = {correction_->group,
                      Parse(message.T_map_body).value.value_or(pose.T_odom_body)};
   }
-  const bool tracks = pose.state == pose_t::STATE_TRACKING;
-  tracked_map_ = tracks ? std::optional(pose.map) : std::nullopt;
+  if (pose.state == pose_t::STATE_TRACKING) {
+    NoteTracked(pose.utime, pose.map);
+  }
   events_.pose = std::move(pose);
 }
 
+void PhoneAgent::NoteTracked(int64_t utime, const MapId& map) {
+  if (tracked_.empty() || tracked_.back().map != map) {
+    tracked_.push_back({map, utime, utime});
+  }
+  tracked_.back().last_utime = utime;
+  if (tracked_.size() > kMaxTrackedMaps) {
+    tracked_.pop_front();
+  }
+}
+
+// The map of a tracked image. It may have ended since: a person takes seconds to name an anchor.
+std::optional<MapId> PhoneAgent::MapAt(int64_t utime) const {
+  const auto tracks = [&](const TrackedMap& tracked) {
+    return tracked.first_utime <= utime && utime <= tracked.last_utime;
+  };
+  const auto found = std::find_if(tracked_.rbegin(), tracked_.rend(), tracks);
+  return found == tracked_.rend() ? std::nullopt : std::optional(found->map);
+}
+
 AnchorId PhoneAgent::PlaceAnchor(const NewAnchor& anchor) {
-  if (!tracked_map_) {
-    throw std::runtime_error("the odometry does not track: an anchor has no place yet");
+  const std::optional<MapId> map = MapAt(anchor.utime);
+  if (!map) {
+    throw std::runtime_error("the odometry did not track this image: an anchor has no place in it");
   }
   last_created_utime_ = std::max(now_us_, last_created_utime_ + 1);
   AnchorEdit edit;
@@ -155,7 +176,7 @@ AnchorId PhoneAgent::PlaceAnchor(const NewAnchor& anchor) {
   edit.agent_id = agent_id_;
   edit.name = anchor.name;
   edit.payload = anchor.payload;
-  edit.map = *tracked_map_;
+  edit.map = *map;
   edit.utime = anchor.utime;
   edit.placement = anchor.pixel ? AnchorEdit::Placement::kPixel : AnchorEdit::Placement::kBody;
   edit.pixel = anchor.pixel.value_or(Eigen::Vector2d::Zero());

@@ -10,6 +10,7 @@
 // sensors' clock, `now_us` since 1970, without steps (bus/wall_clock.h).
 
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <memory>
 #include <opencv2/core/mat.hpp>
@@ -89,7 +90,7 @@ class PhoneAgent {
   // Gives back a keyframe that an earlier run stored. Call it before the first image, in the order
   // in which they were stored. A damaged keyframe is deleted (PhoneEvents::spool).
   void Restore(const std::string& id, Bytes bytes);
-  // Throws std::runtime_error if the odometry does not track or a field is out of bounds.
+  // Throws std::runtime_error if the odometry did not track that image or a field is out of bounds.
   AnchorId PlaceAnchor(const NewAnchor& anchor);
   // Does nothing if there is no such anchor.
   void RemoveAnchor(const AnchorId& id);
@@ -103,9 +104,18 @@ class PhoneAgent {
   PhoneEvents Take();
 
  private:
+  // A map, and the times of its first and last tracked image.
+  struct TrackedMap {
+    MapId map;
+    int64_t first_utime = 0, last_utime = 0;
+  };
+  static constexpr size_t kMaxTrackedMaps = 16;
+
   void Listen();
   void OnKeyframe(Bytes data);
   void OnPose(const pose_t& message);
+  void NoteTracked(int64_t utime, const MapId& map);
+  std::optional<MapId> MapAt(int64_t utime) const;
   void Release(const Have& have);
 
   const int32_t agent_id_;
@@ -117,7 +127,7 @@ class PhoneAgent {
   std::optional<UplinkProcess> uplink_;  // only with a key
   DrawnAnchors anchors_;
   std::optional<Correction> correction_;  // the newest one of the newest map
-  std::optional<MapId> tracked_map_;      // set while the odometry tracks
+  std::deque<TrackedMap> tracked_;        // the newest kMaxTrackedMaps, newest last
   std::set<KeyframeId> spooled_;
   int64_t now_us_ = 0;
   int64_t next_tick_us_ = 0;

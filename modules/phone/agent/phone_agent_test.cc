@@ -52,6 +52,7 @@ int64_t Refused(const status_t& status, const std::string& reason) {
 // A server that has the agent's key.
 class PhoneAgentTest : public testing::Test {
  protected:
+  explicit PhoneAgentTest(const AgentTexts& texts = Texts()) : agent_(ReadAgentConfig(texts)) {}
   void SetUp() override {
     std::filesystem::remove_all(folder_);
     std::filesystem::create_directories(folder_ / "keys");
@@ -97,7 +98,7 @@ class PhoneAgentTest : public testing::Test {
   const std::filesystem::path folder_ =
       std::filesystem::path(testing::TempDir()) / "pangea_phone_agent";
   int64_t now_us_ = kStart_us;
-  PhoneAgent agent_{ReadAgentConfig(Texts())};
+  PhoneAgent agent_;
   LocalBus link_bus_, server_bus_;
   std::optional<AgentHandlerProcess> handler_;
   std::vector<std::vector<uint8_t>> delivered_;
@@ -243,6 +244,50 @@ TEST(PhoneAgentWithDevicePoses, GivesPosesAndKeyframes) {
   EXPECT_EQ(add(std::nullopt).pose->state, pose_t::STATE_LOST);
   agent.StartAnew();
   EXPECT_EQ(add(Rigid3{}).pose->map, (MapId{7, kStart_us + 1}));
+}
+
+class PhoneAgentWithDevicePosesTest : public PhoneAgentTest {
+ protected:
+  PhoneAgentWithDevicePosesTest() : PhoneAgentTest(WithDevicePoses()) {}
+  static AgentTexts WithDevicePoses() {
+    AgentTexts texts = Texts();
+    texts.device_poses = true;
+    return texts;
+  }
+  void AddPose(int64_t utime, const std::optional<Rigid3>& T) {
+    agent_.AddImage(utime, cv::Mat(48, 64, CV_8U, cv::Scalar(0)), T);
+    Run(0.1);
+  }
+};
+
+// The visitor tapped, the map ended, another began, and then the anchor got its name.
+TEST_F(PhoneAgentWithDevicePosesTest, AnAnchorIsPlacedInTheMapOfItsImage) {
+  std::optional<AnchorEdit> placed;
+  server_bus_.Subscribe("ANCHOR_EDIT", [&](const std::string&, Bytes data) {
+    anchor_edit_t message{};
+    ASSERT_TRUE(DecodeMessage(data, &message));
+    placed = Parse(message).value;
+  });
+  int64_t utime = 0;
+  for (int i = 0; i < 10; ++i) {
+    AddPose(utime += 100'000, Rigid3{Eigen::Quaterniond::Identity(), {0.1 * i, 0, 1.5}});
+  }
+  const int64_t tapped = utime;
+  AddPose(utime += 100'000, std::nullopt);
+  EXPECT_THROW(agent_.PlaceAnchor({"lost", "", utime, Eigen::Vector2d(9, 9), {}}),
+               std::runtime_error);
+  agent_.StartAnew();
+  for (int i = 0; i < 10; ++i) {
+    AddPose(utime += 100'000, Rigid3{Eigen::Quaterniond::Identity(), {0.1 * i, 0, 1.5}});
+  }
+  ASSERT_EQ(pose_->map, (MapId{7, kStart_us + 1}));
+  agent_.PlaceAnchor({"kettle", "", tapped, Eigen::Vector2d(9, 9), {}});
+  Run(15);
+  ASSERT_TRUE(placed);
+  EXPECT_EQ(placed->map, (MapId{7, kStart_us}));
+  agent_.PlaceAnchor({"cup", "", utime, Eigen::Vector2d(9, 9), {}});
+  Run(15);
+  EXPECT_EQ(placed->map, (MapId{7, kStart_us + 1}));
 }
 
 TEST_F(PhoneAgentTest, AnImageOfAnotherSizeIsRefusedAndCounted) {
