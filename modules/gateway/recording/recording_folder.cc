@@ -70,8 +70,9 @@ bool RecordingFolder::HasRoomFor(int64_t bytes) const {
     unwritten += upload.bytes - upload.written;
   }
   int64_t kept = 0;
-  for (const auto& entry : fs::directory_iterator(folder_)) {
-    if (entry.path().extension() != kPart) {
+  constexpr auto kReadable = fs::directory_options::skip_permission_denied;
+  for (const auto& entry : fs::recursive_directory_iterator(folder_, kReadable)) {
+    if (entry.is_regular_file() && entry.path().extension() != kPart) {
       kept += static_cast<int64_t>(entry.file_size());
     }
   }

@@ -54,6 +54,14 @@ TEST_F(RecordingFolderTest, RefusesWhatIsBeyondItsRoom) {
   EXPECT_EQ(recordings.Begin(8, 4), "");
 }
 
+TEST_F(RecordingFolderTest, CountsWhatAPersonUnpackedThere) {
+  RecordingFolder recordings(folder_, 10);
+  fs::create_directories(folder_ / "walk" / "mav0");
+  std::ofstream(folder_ / "walk" / "mav0" / "a.jpg") << "12345";
+  EXPECT_EQ(recordings.Begin(7, 5), "");
+  EXPECT_THAT(recordings.Begin(7, 6), HasSubstr("no room"));
+}
+
 TEST_F(RecordingFolderTest, NothingStaysOfWhatIsNotFinished) {
   {
     RecordingFolder recordings(folder_, 1000);
