@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "agent_handler/agent_handler_process.h"
@@ -131,6 +132,23 @@ TEST_F(GatewayProcessTest, AVisitorGetsThePageAndAKeyOnce) {
 
   EXPECT_THAT(Post(JoinBody(code)), StartsWith("HTTP/1.1 403"));
   EXPECT_EQ(NumRefused("join: This code"), 1);
+}
+
+TEST_F(GatewayProcessTest, NamesThatAreNotUtf8) {
+  const std::string code = NewCode();
+  EXPECT_THAT(Post(R"({"code": ")" + code + R"(", "name": "Ann)" + "\xc3\"}"),
+              StartsWith("HTTP/1.1 400"));
+  EXPECT_EQ(NumRefused("join: the request is malformed"), 1);
+  ASSERT_THAT(Post(JoinBody(code)), StartsWith("HTTP/1.1 200")) << "the code was not used up";
+  // A file that somebody edited costs only the name.
+  std::ofstream(site_.gateway() / "agents" / "1001.json")
+      << R"({"agent": 1001, "joined_s": 1, "name": "Ann)"
+      << "\xc3\"}";
+  NewKey(5);
+  const json told = BodyOf(Ask("GET /v1/info HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"));
+  EXPECT_THAT(told["agents"], SizeIs(2));
+  EXPECT_EQ(told["agents"][1]["agent"], 1001);
+  EXPECT_EQ(told["agents"][1]["name"], "");
 }
 
 // The phone's uplink here is on a bus of its own, which its socket joins with the gateway.

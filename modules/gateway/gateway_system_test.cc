@@ -4,7 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <chrono>
+#include <cstdio>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <thread>
@@ -43,6 +45,16 @@ class GatewayProgram : public testing::Test {
     }
     const std::string url = ReadAddress(site_).url;
     port_ = static_cast<uint16_t>(std::stoi(url.substr(url.rfind(':') + 1)));
+  }
+  // Runs `pangea-gateway invite`; returns its exit status and what it printed.
+  std::pair<int, std::string> Invite(const std::string& arguments) const {
+    const std::string command = fmt::format("{}/bin/pangea-gateway invite --site {} {} 2>&1",
+                                            PANGEA_BINARY_DIR, folder_.string(), arguments);
+    FILE* const program = popen(command.c_str(), "r");
+    std::array<char, 65536> said{};
+    const size_t size = fread(said.data(), 1, said.size(), program);
+    const int status = pclose(program);
+    return {WEXITSTATUS(status), std::string(said.data(), size)};
   }
   int64_t MemoryKb() const {
     std::ifstream status(fmt::format("/proc/{}/status", program_->pid()));
@@ -111,6 +123,14 @@ TEST_F(GatewayProgram, FiftyAgentsAtOnceInBoundedMemory) {
   const int64_t each_kb = (MemoryKb() - before_kb) / kAgents;
   std::cout << fmt::format("before {} kB, each agent {} kB\n", before_kb, each_kb);
   EXPECT_LT(each_kb, 200);
+}
+
+TEST_F(GatewayProgram, InvitesNobodyWhoseNameIsNotUtf8) {
+  Start();
+  const auto [status, said] = Invite("--name \"$(printf 'Ann\\303')\"");
+  EXPECT_EQ(status, 1);
+  EXPECT_EQ(said, "pangea-gateway: --name: give at most 60 bytes of UTF-8 that can be shown\n");
+  EXPECT_TRUE(fs::is_empty(site_.gateway() / "invites"));
 }
 
 // An agent that got a key and lost the gateway tries again. One code never yields two keys.

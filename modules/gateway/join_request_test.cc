@@ -68,9 +68,19 @@ TEST(JoinRequest, SaysWhatIsWrong) {
               HasSubstr("too long"));
 }
 
+// In turn: a byte that never occurs, a cut sequence, a longer form of "/", half a surrogate pair,
+// and a number that is no character.
+const char* const kNotUtf8[] = {"\xff", "Ann\xc3", "\xc0\xaf", "\xed\xa0\x80", "\xf4\x90\x80\x80"};
+
 TEST(JoinRequest, ANameIsUtf8) {
   EXPECT_TRUE(IsVisitorName("アンナ"));
-  EXPECT_FALSE(IsVisitorName("\xc3("));
+  for (const std::string name : kNotUtf8) {
+    EXPECT_FALSE(IsVisitorName(name)) << testing::PrintToString(name);
+    EXPECT_THAT(Bad(R"({"code": "ABCD-EFGH-JKMN-PQRS", "name": ")" + name + "\"}"),
+                HasSubstr("no JSON object"));
+  }
+  EXPECT_THAT(Bad(R"({"code": "ABCD-EFGH-JKMN-PQRS", "name": "\ud800"})"),
+              HasSubstr("no JSON object"));
 }
 
 TEST(AttemptLimit, SoManyAtOnceThenOneInAWhile) {
