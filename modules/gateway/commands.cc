@@ -45,9 +45,12 @@ void MakeInvite(const Arguments& arguments) {
     throw std::runtime_error(
         fmt::format("--name: give at most {} bytes of UTF-8 that can be shown", kMaxVisitorName));
   }
-  const int64_t expires_s = NowSeconds() + arguments.expires_s;
+  const int64_t now_s = NowSeconds();
+  const int64_t expires_s = now_s + arguments.expires_s;
+  Admission admission(site);
+  admission.Invites(now_s);  // removes the expired ones, so that they take no room
   const std::string code =
-      Admission(site).Make({arguments.name, AnchorRightOf(arguments.rights).value(), expires_s});
+      admission.Make({arguments.name, AnchorRightOf(arguments.rights).value(), expires_s});
   const std::string url = fmt::format("{}#join={}", address.url, code);
   std::cout << fmt::format("{}\ncode {}, for one agent, until {}\n{}\ncertificate's SHA-256: {}\n",
                            QrCode(url, isatty(STDOUT_FILENO) == 1), code, Date(expires_s), url,

@@ -133,6 +133,17 @@ TEST_F(GatewayProgram, InvitesNobodyWhoseNameIsNotUtf8) {
   EXPECT_TRUE(fs::is_empty(site_.gateway() / "invites"));
 }
 
+TEST_F(GatewayProgram, ExpiredInvitesTakeNoRoom) {
+  Start();
+  for (size_t i = 0; i < Admission::kMaxInvites; ++i) {
+    std::ofstream(site_.gateway() / "invites" / fmt::format("{}.json", i))
+        << R"({"anchors": "own", "expires_s": 1, "name": ""})";
+  }
+  const auto [status, said] = Invite("--name Anna");
+  EXPECT_EQ(status, 0) << said;
+  EXPECT_THAT(said, testing::HasSubstr("for one agent, until"));
+}
+
 // An agent that got a key and lost the gateway tries again. One code never yields two keys.
 TEST_F(GatewayProgram, AKillWhileAgentsJoinHandsNoCodeOutTwice) {
   for (int round = 0; round < 8; ++round) {
