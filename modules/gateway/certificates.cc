@@ -266,6 +266,13 @@ std::string Fingerprint(const std::string& certificate_pem) {
   return text;
 }
 
+int64_t ExpiryOf(const std::string& certificate_pem) {
+  const Certificate certificate = ReadCertificate(certificate_pem);
+  std::tm end{};
+  Check(ASN1_TIME_to_tm(X509_get0_notAfter(certificate.get()), &end) == 1, "an expiry");
+  return timegm(&end);
+}
+
 std::string ToDer(const std::string& certificate_pem) {
   const Certificate certificate = ReadCertificate(certificate_pem);
   const Memory memory(BIO_new(BIO_s_mem()));

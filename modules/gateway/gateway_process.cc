@@ -13,6 +13,7 @@ namespace pangea {
 namespace {
 
 constexpr int64_t kSecond_us = 1'000'000;
+constexpr int64_t kHour_us = 3600 * kSecond_us;
 
 web::WebOptions WithIdentity(const GatewayProcess::Options& options) {
   web::WebOptions web = options.web;
@@ -42,6 +43,8 @@ GatewayAddress AddressOf(const GatewayProcess::Options& options, uint16_t port) 
 GatewayProcess::GatewayProcess(Bus& link_bus, Bus& server_bus, const site::Site& site,
                                const Options& options)
     : link_bus_(link_bus),
+      site_(site),
+      identity_(options.identity),
       node_(server_bus, "gateway"),
       admission_(site),
       key_folder_(site.keys()),
@@ -70,7 +73,7 @@ Gateway::Events GatewayProcess::Events() {
 
 JoinResult GatewayProcess::Join(const JoinRequest& request) {
   try {
-    JoinResult result = admission_.Join(request, now_utime_ / kSecond_us);
+    JoinResult result = admission_.Join(request, date_s_);
     if (result.status == 200) {
       node_.Count("joined");
       LookForKeys();  // so that the new agent can connect at once
@@ -111,17 +114,34 @@ void GatewayProcess::LookForKeys() {
   }
 }
 
+// While it fails, the present certificate is used.
+void GatewayProcess::RenewCertificate() {
+  try {
+    if (const auto renewed = RenewIdentity(site_, identity_, date_s_)) {
+      server_.UseIdentity(*renewed);
+      identity_.server = *renewed;
+      node_.Count("certificates_renewed");
+    }
+  } catch (const std::exception& error) {
+    node_.Refuse(error.what());
+  }
+}
+
 void GatewayProcess::Serve(int timeout_ms) {
   gateway_.SetNow(SteadyMicros());
   server_.Serve(timeout_ms);
 }
 
-void GatewayProcess::Tick(int64_t now_utime) {
-  now_utime_ = now_utime;
+void GatewayProcess::Tick(int64_t now_utime, int64_t date_s) {
+  date_s_ = date_s;
   if (now_utime >= next_look_utime_) {
     next_look_utime_ = now_utime + kSecond_us;
     LookForKeys();
     PublishStatus(now_utime);
+  }
+  if (now_utime >= next_renewal_utime_) {
+    next_renewal_utime_ = now_utime + kHour_us;
+    RenewCertificate();
   }
 }
 

@@ -5,7 +5,7 @@
 //   link bus    LINK_DOWN_* in; LINK_UP_k out
 //   server bus  STATUS_gateway out
 // Keys and names are read again every second if they changed, so agents can join and leave while it
-// runs.
+// runs. Every hour it looks whether its certificate must be renewed.
 
 #include <cstdint>
 #include <string>
@@ -36,8 +36,9 @@ class GatewayProcess {
 
   // Handles requests and sockets for `timeout_ms`; with 0, only what is already there.
   void Serve(int timeout_ms);
-  // Call it at about 10 Hz. `now_utime`: wall clock, as for Process::Tick.
-  void Tick(int64_t now_utime);
+  // Call it at about 10 Hz. `now_utime`: as for Process::Tick. `date_s`: seconds since 1970 by the
+  // system's clock, which may have been set since the start: codes and certificates expire by it.
+  void Tick(int64_t now_utime, int64_t date_s);
 
   const GatewayAddress& address() const { return address_; }
   uint16_t port() const { return server_.port(); }
@@ -47,9 +48,12 @@ class GatewayProcess {
   JoinResult Join(const JoinRequest& request);
   void ReadAgents();
   void LookForKeys();
+  void RenewCertificate();
   void PublishStatus(int64_t now_utime);
 
   Bus& link_bus_;
+  const site::Site site_;
+  GatewayIdentity identity_;
   Node node_;
   Admission admission_;
   KeyFolder key_folder_;
@@ -58,8 +62,9 @@ class GatewayProcess {
   Gateway gateway_;
   web::WebServer server_;
   GatewayAddress address_;
-  int64_t now_utime_ = 0;
+  int64_t date_s_ = 0;
   int64_t next_look_utime_ = 0;
+  int64_t next_renewal_utime_ = 0;
 };
 
 }  // namespace pangea

@@ -2,6 +2,7 @@
 
 #include "gateway/gateway_process.h"
 
+#include <fmt/chrono.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -30,6 +31,8 @@ using testing::SizeIs;
 using testing::StartsWith;
 
 constexpr int64_t kSecond = 1'000'000;
+constexpr int64_t kDay = 86'400 * kSecond;
+const MachineNames kNames{{"localhost"}, {"127.0.0.1"}};
 
 class GatewayProcessTest : public testing::Test {
  protected:
@@ -37,11 +40,8 @@ class GatewayProcessTest : public testing::Test {
     fs::remove_all(folder_);
     site_ = site::OpenSite(folder_);
     MakeGatewayFolders(site_);
-    identity_ = OpenIdentity(site_, {{"localhost"}, {"127.0.0.1"}}, WallUtime() / kSecond);
-    const auto page = std::make_shared<const std::string>("<p>page");
-    const GatewayProcess::Options options{
-        {"127.0.0.1", 0, {}}, {{"/", {"text/html", page, nullptr}}}, identity_, "127.0.0.1"};
-    process_.emplace(link_bus_, server_bus_, site_, options);
+    identity_ = OpenIdentity(site_, kNames, Date());
+    Open(identity_);
     server_bus_.Subscribe("STATUS_gateway", [this](const std::string&, Bytes data) {
       EXPECT_TRUE(DecodeMessage(data, &status_));
     });
@@ -50,15 +50,22 @@ class GatewayProcessTest : public testing::Test {
     });
   }
 
+  void Open(const GatewayIdentity& identity) {
+    const auto page = std::make_shared<const std::string>("<p>page");
+    const GatewayProcess::Options options{
+        {"127.0.0.1", 0, {}}, {{"/", {"text/html", page, nullptr}}}, identity, "127.0.0.1"};
+    process_.emplace(link_bus_, server_bus_, site_, options);
+  }
   void Serve(int rounds = 5) {
     for (int i = 0; i < rounds; ++i) {
-      process_->Tick(WallUtime() + skipped_us_);
+      process_->Tick(WallUtime() + skipped_us_, Date());
       process_->Serve(10);
       link_bus_.Drain();
       server_bus_.Drain();
     }
   }
-  // As if so much time had passed for what happens once a second.
+  int64_t Date() const { return (WallUtime() + skipped_us_) / kSecond; }
+  // As if so much time had passed, except for sockets.
   void Skip(int64_t us) {
     skipped_us_ += us;
     Serve();
@@ -241,6 +248,74 @@ TEST_F(GatewayProcessTest, ARecordingIsKeptUnderTheSite) {
   EXPECT_THAT(anna.close_reason(), HasSubstr("_agent_5.zip"));
   EXPECT_EQ(ReadTextFile(site_.recordings() / anna.close_reason()), zip);
   EXPECT_EQ(fs::status(site_.recordings()).permissions(), fs::perms::owner_all);
+}
+
+// The certificate that a new connection gets.
+class CertificateTest : public GatewayProcessTest {
+ protected:
+  std::string Certificate() {
+    web::TlsClient client(process_->port());
+    for (int i = 0; i < 10 && client.certificate().empty(); ++i) {
+      Serve(1);
+    }
+    return client.certificate();
+  }
+  // Writes a certificate that a user brings, valid for so many days more; returns its file.
+  std::string WriteOwn(int days) {
+    const int64_t made_s = Date() - (kServerDays - days) * (kDay / kSecond);
+    const Identity own =
+        MakeServerCertificate(MakeAuthority("own", {}, made_s), kNames, made_s).identity;
+    WriteFile("own.pem", own.certificate_chain_pem);
+    WriteFile("own.key", own.private_key_pem);
+    return (folder_ / "own.pem").string();
+  }
+  void WriteFile(const std::string& name, const std::string& text) {
+    std::ofstream(folder_ / name) << text;
+  }
+};
+
+TEST_F(CertificateTest, IsRenewedWhileTheGatewayRuns) {
+  GatewayAgent anna(process_->port(), 5, NewKey(5));
+  for (int i = 0; i < 10 && !anna.proven(); ++i) {
+    Serve(2);
+    anna.Received();
+  }
+  Serve();
+  const std::string first = Certificate();
+  Skip((kServerDays - 31) * kDay);
+  EXPECT_EQ(Certificate(), first);
+  Skip(2 * kDay);
+  const std::string second = Certificate();
+  EXPECT_NE(second, first);
+  EXPECT_TRUE(IsGoodFor({second, ReadTextFile(site_.gateway() / "server.key")},
+                        {identity_.authority_pem, ""}, kNames, Date(), kServerDays - 2));
+  EXPECT_EQ(ReadTextFile(site_.gateway() / "server.pem").substr(0, second.size()), second);
+  Skip(kServerDays * kDay);
+  EXPECT_NE(Certificate(), second);
+  anna.Send(std::vector<uint8_t>{1, 2, 3});
+  Serve();
+  EXPECT_THAT(up_, ElementsAre(testing::Pair("LINK_UP_5", "\1\2\3"))) << "the link was cut";
+}
+
+TEST_F(CertificateTest, StaysWhileItCannotBeRenewed) {
+  const std::string first = Certificate();
+  fs::remove(site_.gateway() / "ca.key");
+  Skip((kServerDays - 29) * kDay);
+  EXPECT_EQ(Certificate(), first);
+  EXPECT_GE(NumRefused((site_.gateway() / "ca.key").string()), 1);
+}
+
+TEST_F(CertificateTest, OfTheUserIsOnlyWarnedAbout) {
+  const std::string file = WriteOwn(31);
+  Open(ReadIdentity(file, (folder_ / "own.key").string()));
+  const std::string first = Certificate();
+  EXPECT_THAT(status_.refused, IsEmpty());
+  Skip(2 * kDay);
+  const std::string date = fmt::format("{:%Y-%m-%d}", fmt::gmtime(ExpiryOf(first)));
+  EXPECT_EQ(NumRefused(fmt::format("{}: this certificate expires on {}", file, date)), 1);
+  Skip(30 * kDay);
+  EXPECT_EQ(NumRefused(fmt::format("{}: this certificate has expired on {}", file, date)), 1);
+  EXPECT_EQ(Certificate(), first);
 }
 
 // While strangers do what they like, an agent's packets go on.

@@ -1,5 +1,6 @@
 #include "gateway/identity.h"
 
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -17,6 +18,7 @@ using nlohmann::json;
 
 constexpr mode_t kPublic = 0644;
 constexpr int kRenewBefore_days = 30;
+constexpr int64_t kSecondsPerDay = 86'400;
 
 // The key is written first, so that a certificate always has its key.
 void WriteIdentity(const fs::path& folder, const std::string& name, const Identity& identity) {
@@ -28,13 +30,7 @@ Identity ReadPair(const fs::path& certificate, const fs::path& key) {
   return {ReadTextFile(certificate), ReadTextFile(key)};
 }
 
-Identity OpenAuthority(const site::Site& site, const MachineNames& names, int64_t now_s) {
-  const fs::path folder = site.gateway();
-  if (!Exists(folder / "ca.pem")) {
-    const Identity made =
-        MakeAuthority(fmt::format("Pangea {}", site.description.name), names, now_s);
-    WriteIdentity(folder, "ca", made);
-  }
+Identity ReadAuthority(const fs::path& folder, int64_t now_s) {
   Identity read = ReadPair(folder / "ca.pem", folder / "ca.key");
   if (!CanVouch(read, now_s, kRenewBefore_days)) {
     throw std::runtime_error(
@@ -45,30 +41,73 @@ Identity OpenAuthority(const site::Site& site, const MachineNames& names, int64_
   return read;
 }
 
+Identity OpenAuthority(const site::Site& site, const MachineNames& names, int64_t now_s) {
+  const fs::path folder = site.gateway();
+  if (!Exists(folder / "ca.pem")) {
+    const Identity made =
+        MakeAuthority(fmt::format("Pangea {}", site.description.name), names, now_s);
+    WriteIdentity(folder, "ca", made);
+  }
+  return ReadAuthority(folder, now_s);
+}
+
+void CheckDateOf(const GatewayIdentity& identity, int64_t now_s) {
+  const int64_t expiry_s = ExpiryOf(identity.server.certificate_chain_pem);
+  if (now_s + kRenewBefore_days * kSecondsPerDay >= expiry_s) {
+    throw std::runtime_error(
+        fmt::format("{}: this certificate {} on {:%Y-%m-%d}: restart the gateway with a newer one",
+                    identity.file, now_s < expiry_s ? "expires" : "has expired",
+                    fmt::gmtime(static_cast<std::time_t>(expiry_s))));
+  }
+}
+
 }  // namespace
 
 GatewayIdentity OpenIdentity(const site::Site& site, const MachineNames& names, int64_t now_s) {
   const fs::path folder = site.gateway();
   const Identity authority = OpenAuthority(site, names, now_s);
   MadeCertificate made = MakeServerCertificate(authority, names, now_s);
-  MachineNames covered = names;
+  GatewayIdentity identity{made.identity, authority.certificate_chain_pem, made.left_out, names,
+                           (folder / "server.pem").string()};
   const auto is_left_out = [&](const std::string& name) {
     return std::ranges::count(made.left_out, name) > 0;
   };
-  std::erase_if(covered.hosts, is_left_out);
-  std::erase_if(covered.addresses, is_left_out);
+  std::erase_if(identity.names.hosts, is_left_out);
+  std::erase_if(identity.names.addresses, is_left_out);
   if (Exists(folder / "server.pem") && Exists(folder / "server.key")) {
     const Identity kept = ReadPair(folder / "server.pem", folder / "server.key");
-    if (IsGoodFor(kept, authority, covered, now_s, kRenewBefore_days)) {
-      return {kept, authority.certificate_chain_pem, made.left_out};
+    if (IsGoodFor(kept, authority, identity.names, now_s, kRenewBefore_days)) {
+      identity.server = kept;
+      return identity;
     }
   }
-  WriteIdentity(folder, "server", made.identity);
-  return {made.identity, authority.certificate_chain_pem, made.left_out};
+  WriteIdentity(folder, "server", identity.server);
+  return identity;
 }
 
 GatewayIdentity ReadIdentity(const std::string& certificate_file, const std::string& key_file) {
-  return {ReadPair(certificate_file, key_file), "", {}};
+  return {ReadPair(certificate_file, key_file), "", {}, {}, certificate_file};
+}
+
+std::optional<Identity> RenewIdentity(const site::Site& site, const GatewayIdentity& identity,
+                                      int64_t now_s) {
+  if (identity.authority_pem.empty()) {
+    CheckDateOf(identity, now_s);
+    return std::nullopt;
+  }
+  if (IsGoodFor(identity.server, {identity.authority_pem, ""}, identity.names, now_s,
+                kRenewBefore_days)) {
+    return std::nullopt;
+  }
+  const Identity authority = ReadAuthority(site.gateway(), now_s);
+  if (authority.certificate_chain_pem != identity.authority_pem) {
+    throw std::runtime_error(
+        fmt::format("{}: is another one than at the start: restart the gateway",
+                    (site.gateway() / "ca.pem").string()));
+  }
+  const Identity made = MakeServerCertificate(authority, identity.names, now_s).identity;
+  WriteIdentity(site.gateway(), "server", made);
+  return made;
 }
 
 void WriteAddress(const site::Site& site, const GatewayAddress& address) {

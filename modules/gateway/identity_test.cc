@@ -53,6 +53,12 @@ TEST(Certificates, TheAuthorityVouchesForPrivateNetworksOnly) {
       {{"robot", "hall.example.org", "a.lan"}, {"10.1.2.3", "8.8.8.7", "fe80::1"}}, kIssued_s, 1));
 }
 
+TEST(Certificates, SayWhenTheyExpire) {
+  const Identity authority = MakeAuthority("Pangea hall", {}, kIssued_s);
+  EXPECT_EQ(ExpiryOf(authority.certificate_chain_pem), kIssued_s + kAuthorityDays * kDay_s);
+  EXPECT_THROW(ExpiryOf("nonsense"), std::runtime_error);
+}
+
 TEST(Certificates, HaveFingerprintsAndAFormForPhones) {
   const Identity authority = MakeAuthority("Pangea hall", {}, kIssued_s);
   const std::string fingerprint = Fingerprint(authority.certificate_chain_pem);
@@ -103,6 +109,31 @@ TEST_F(IdentityTest, IsRenewedBeforeItRunsOutAndForNewAddresses) {
   const GatewayIdentity partly = Open(kIssued_s + (kServerDays - 29) * kDay_s, moved);
   EXPECT_EQ(elsewhere.server.certificate_chain_pem, partly.server.certificate_chain_pem);
   EXPECT_THAT(partly.left_out, Contains("8.8.8.8"));
+}
+
+TEST_F(IdentityTest, IsRenewedWhileItIsUsedForTheSameNames) {
+  MachineNames names = kNames;
+  names.addresses.emplace_back("8.8.8.8");
+  const GatewayIdentity first = Open(kIssued_s, names);
+  EXPECT_FALSE(RenewIdentity(site_, first, kIssued_s + (kServerDays - 31) * kDay_s));
+  const int64_t late_s = kIssued_s + (kServerDays - 30) * kDay_s;
+  const auto renewed = RenewIdentity(site_, first, late_s);
+  ASSERT_TRUE(renewed);
+  EXPECT_TRUE(IsGoodFor(*renewed, {first.authority_pem, ""}, kNames, late_s, kServerDays - 1));
+  EXPECT_EQ(Open(late_s).server.certificate_chain_pem, renewed->certificate_chain_pem);
+}
+
+// Phones trust the authority with which the gateway started.
+TEST_F(IdentityTest, IsNotRenewedByAnotherAuthority) {
+  const GatewayIdentity first = Open();
+  fs::remove(site_.gateway() / "ca.pem");
+  Open();
+  try {
+    RenewIdentity(site_, first, kIssued_s + kServerDays * kDay_s);
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("ca.pem: is another one than at the start"));
+  }
 }
 
 TEST_F(IdentityTest, SaysWhatIsWrongWithTheAuthority) {

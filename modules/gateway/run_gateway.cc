@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <ctime>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -53,7 +54,7 @@ GatewayIdentity IdentityOf(const GatewayArguments& arguments, const site::Site& 
   if (!arguments.certificate.empty()) {
     return ReadIdentity(arguments.certificate, arguments.key);
   }
-  GatewayIdentity identity = OpenIdentity(site, names, WallUtime() / 1'000'000);
+  GatewayIdentity identity = OpenIdentity(site, names, std::time(nullptr));
   for (const std::string& name : identity.left_out) {
     std::cout << fmt::format(
         "{} is not in the certificate: the gateway's authority vouches for private networks and "
@@ -103,7 +104,7 @@ void RunGateway(const GatewayArguments& arguments) {
   int64_t next_tick = 0;
   while (!StopRequested()) {
     if (const int64_t now = WallUtime(); now >= next_tick) {
-      process.Tick(now);
+      process.Tick(now, std::time(nullptr));
       next_tick = now + kTickInterval_us;
     }
     HandleWaiting(link_bus);

@@ -13,35 +13,17 @@ namespace {
 
 constexpr std::chrono::milliseconds kAcceptRetry{100};
 
-}  // namespace
-
-struct WebServer::Impl : ServerState {
-  Impl(const WebOptions& web_options, WebSite& web_site)
-      : ServerState(web_options, web_site), acceptor(io), retry(io) {}
-
-  void UseTls(const TlsIdentity& identity);
-  void Listen();
-  void Accept();
-  void AcceptLater();
-  void Welcome(tcp::socket socket);
-  void SendToPeers();
-
-  std::optional<asio::ssl::context> tls;
-  tcp::acceptor acceptor;
-  asio::steady_timer retry;
-};
-
-void WebServer::Impl::UseTls(const TlsIdentity& identity) {
-  tls.emplace(asio::ssl::context::tls_server);
-  SSL_CTX_set_min_proto_version(tls->native_handle(), TLS1_2_VERSION);
+asio::ssl::context ContextOf(const TlsIdentity& identity) {
+  asio::ssl::context tls(asio::ssl::context::tls_server);
+  SSL_CTX_set_min_proto_version(tls.native_handle(), TLS1_2_VERSION);
   // Our clients neither renegotiate nor resume sessions. Idle connections release their buffers.
-  tls->set_options(SSL_OP_NO_RENEGOTIATION | SSL_OP_NO_TICKET);
-  SSL_CTX_set_session_cache_mode(tls->native_handle(), SSL_SESS_CACHE_OFF);
-  SSL_CTX_set_mode(tls->native_handle(), SSL_MODE_RELEASE_BUFFERS);
+  tls.set_options(SSL_OP_NO_RENEGOTIATION | SSL_OP_NO_TICKET);
+  SSL_CTX_set_session_cache_mode(tls.native_handle(), SSL_SESS_CACHE_OFF);
+  SSL_CTX_set_mode(tls.native_handle(), SSL_MODE_RELEASE_BUFFERS);
   beast::error_code error;
-  tls->use_certificate_chain(asio::buffer(identity.certificate_chain_pem), error);
+  tls.use_certificate_chain(asio::buffer(identity.certificate_chain_pem), error);
   if (!error) {
-    tls->use_private_key(asio::buffer(identity.private_key_pem), asio::ssl::context::pem, error);
+    tls.use_private_key(asio::buffer(identity.private_key_pem), asio::ssl::context::pem, error);
   }
   if (error) {
     throw std::runtime_error(fmt::format(
@@ -49,7 +31,25 @@ void WebServer::Impl::UseTls(const TlsIdentity& identity) {
         "server's own certificate first",
         error.message()));
   }
+  return tls;
 }
+
+}  // namespace
+
+struct WebServer::Impl : ServerState {
+  Impl(const WebOptions& web_options, WebSite& web_site)
+      : ServerState(web_options, web_site), acceptor(io), retry(io) {}
+
+  void Listen();
+  void Accept();
+  void AcceptLater();
+  void Welcome(tcp::socket socket);
+  void SendToPeers();
+
+  std::optional<asio::ssl::context> tls;  // of further connections; each keeps its own
+  tcp::acceptor acceptor;
+  asio::steady_timer retry;
+};
 
 void WebServer::Impl::Listen() {
   beast::error_code error;
@@ -123,7 +123,7 @@ WebServer::WebServer(const WebOptions& options, WebSite& site)
     : impl_(std::make_unique<Impl>(options, site)) {
   CheckOrigins(options.origins);
   if (options.tls) {
-    impl_->UseTls(*options.tls);
+    UseIdentity(*options.tls);
   }
   impl_->Listen();
   impl_->Accept();
@@ -132,6 +132,8 @@ WebServer::WebServer(const WebOptions& options, WebSite& site)
 WebServer::~WebServer() = default;
 
 uint16_t WebServer::port() const { return impl_->acceptor.local_endpoint().port(); }
+
+void WebServer::UseIdentity(const TlsIdentity& identity) { impl_->tls = ContextOf(identity); }
 
 void WebServer::Serve(int timeout_ms) {
   impl_->SendToPeers();

@@ -50,6 +50,9 @@ class WebServer {
   ~WebServer();
 
   uint16_t port() const;
+  // For a server with WebOptions::tls: further connections get this certificate. Throws as the
+  // constructor does; then the present certificate stays.
+  void UseIdentity(const TlsIdentity& identity);
   // Sends messages to the peers and handles requests for `timeout_ms`; with 0, only what is already
   // there.
   void Serve(int timeout_ms);

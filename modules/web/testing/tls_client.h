@@ -72,6 +72,20 @@ class TlsClient {
     return SSL_is_init_finished(ssl_.get()) == 1;
   }
 
+  // The server's certificate as PEM; empty before the handshake.
+  std::string certificate() {
+    Pump();
+    const std::unique_ptr<X509, void (*)(X509*)> certificate(SSL_get1_peer_certificate(ssl_.get()),
+                                                             X509_free);
+    const std::unique_ptr<BIO, void (*)(BIO*)> memory(BIO_new(BIO_s_mem()), BIO_free_all);
+    if (certificate == nullptr || PEM_write_bio_X509(memory.get(), certificate.get()) != 1) {
+      return "";
+    }
+    char* data = nullptr;
+    const long size = BIO_get_mem_data(memory.get(), &data);
+    return {data, static_cast<size_t>(size)};
+  }
+
  private:
   void Trust(const std::string& authority_pem) {
     BIO* const memory =
