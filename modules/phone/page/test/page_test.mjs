@@ -1,73 +1,12 @@
 // Tests the page in headless Chromium with a fake agent (fake_agent.mjs) and with camera and motion emulated by the browser: drawing,
 // tapping, recording, interruptions, and playing the recording.
 
-import { createServer } from "node:http";
 import { readFile } from "node:fs/promises";
-import { extname, join } from "node:path";
-import { fileURLToPath } from "node:url";
 import { unzipSync, zipSync } from "fflate";
 import { PNG } from "pngjs";
-import { WebSocketServer } from "ws";
 import { becomes, check, launch, openPage, options, run } from "../../../viewer/page/test/harness.mjs";
-import { installFakeXr, projectionOf } from "./fake_xr.mjs";
-
-const kTypes = { ".html": "text/html", ".js": "text/javascript", ".mjs": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml" };
-const kFake = fileURLToPath(new URL("fake_agent.mjs", import.meta.url));
-const kAgents = { agents: [{ agent: 2, name: "Anna", connected: true }, { agent: 3, name: "Ben", connected: true }] };
-
-// Refuses the first upload and keeps the second one.
-const uploads = [];
-function takeUploads(socket) {
-  const messages = [];
-  if (uploads.push(messages) === 1) return socket.close(4413, "the server has no room for more recordings");
-  socket.on("message", (message) => {
-    messages.push(message);
-    const [, size, ...parts] = messages;
-    if (!size) return;
-    const taken = parts.reduce((sum, { length }) => sum + length, 0);
-    if (BigInt(taken) === size.readBigUInt64LE()) return socket.close(4200, "walk.zip");
-    const said = Buffer.alloc(8);
-    said.writeBigUInt64LE(BigInt(taken));
-    socket.send(said);
-  });
-}
-
-// Serves the page, and those parts of the gateway that it uses.
-async function serve() {
-  const server = createServer(async ({ url }, answer) => {
-    const path = new URL(url, "http://x").pathname;
-    if (path === "/v1/info") return answer.end(JSON.stringify(kAgents));
-    if (path === "/v1/join") {
-      answer.statusCode = 403;
-      return answer.end(JSON.stringify({ error: "This code is not known, or was used." }));
-    }
-    const file = path === "/pangea_agent.mjs" ? kFake : join(options.page, path === "/" ? "index.html" : path);
-    answer.setHeader("Content-Type", kTypes[extname(file)] ?? "application/octet-stream");
-    answer.end(await readFile(file).catch(() => ((answer.statusCode = 404), "")));
-  });
-  new WebSocketServer({ server }).on("connection", (socket, { url }) => {
-    socket.send(Buffer.alloc(32));
-    if (url.startsWith("/recording")) takeUploads(socket);
-  });
-  await new Promise((done) => server.listen(0, "127.0.0.1", done));
-  return `http://localhost:${server.address().port}/`;
-}
-
-const screenshot = (page, name) => page.screenshot({ path: `${options.out}/phone_${name}.png` });
-const kPhone = { viewport: { width: 360, height: 720 }, permissions: ["camera", "accelerometer", "gyroscope"] };
-const told = (page) => page.evaluate(() => JSON.parse(pangea.walk.vio.text));
-
-// The motion of a phone that is held upright and rotates about its x axis.
-async function senseMotion(page) {
-  const devtools = await page.context().newCDPSession(page);
-  const readings = [["accelerometer", 0, 9.8, 0.3], ["linear-acceleration", 0, 0, 0.3], ["gyroscope", 0.5, 0, -0.25]];
-  for (const [type] of readings) {
-    await devtools.send("Emulation.setSensorOverrideEnabled", { enabled: true, type, metadata: { available: true } });
-  }
-  for (const [type, x, y, z] of readings) {
-    await devtools.send("Emulation.setSensorOverrideReadings", { type, reading: { xyz: { x, y, z } } });
-  }
-}
+import { kFake, kPhone, screenshot, senseMotion, serve, told, uploads } from "./page_tools.mjs";
+import { testXr, testXrBlind, testXrRefused } from "./page_xr.mjs";
 
 async function testLive(browser, url) {
   const page = await openPage(browser, url, { ...kPhone, hasTouch: true });
@@ -367,110 +306,6 @@ async function testPlaying(browser, url, zip) {
   check("with its motion", Math.abs(imu[0] - 0.5) < 0.01 && Math.abs(imu[4] - 9.8) < 0.06, String(imu));
   await becomes(page, "the end ends the map", () => pangea.walk.numImages === pangea.walk.vio.counters.images);
   await screenshot(page, "playing_dark");
-  await page.close();
-}
-
-// A device with its own odometry looks along odom's y from a height of 1.5 m; the lower and the right part of its image are darker.
-async function testXr(browser, url) {
-  const page = await openPage(browser, url, { viewport: { width: 360, height: 480 }, permissions: ["camera", "accelerometer", "gyroscope"] }, async (page) => {
-    await page.addInitScript(installFakeXr, { frame_ms: 33 });
-    await page.addInitScript(countSamplers);
-  });
-  await page.evaluate((projection) => {
-    const picture = new OffscreenCanvas(960, 1280);
-    const context = picture.getContext("2d");
-    for (const [grey, x, y] of [[200, 0, 0], [150, 480, 0], [100, 0, 640], [50, 480, 640]]) {
-      context.fillStyle = `rgb(${grey} ${grey} ${grey})`;
-      context.fillRect(x, y, 480, 640);
-    }
-    const lens = { picture, width: 960, height: 1280, projection };
-    const half = Math.SQRT1_2;
-    window.xrSource = () => ({ ...lens, ...window.xrSize, ...(!window.xrLost && { position: { x: 0, y: 1.5, z: 0 }, orientation: { x: 0, y: half, z: 0, w: half } }) });
-  }, projectionOf({ width: 960, height: 1280, focal: 1000 }));
-  await stopBeforeFirstImage(page);
-  await page.locator("#start").click();
-  await becomes(page, "WebXR: the device's images reach the agent", () => pangea.walk?.vio?.counters.images > 5);
-  const { cameraYaml, edges } = await told(page);
-  check("its camera too, smaller", /resolution: \[480, 640\]/.test(cameraYaml) && /intrinsics: \[500\.000, 500\.000, 239\.500, 319\.500\]/.test(cameraYaml));
-  const expected = { top: 200, bottom: 100, left: 200, right: 150 };
-  check("the image is upright and exact", Object.entries(expected).every(([side, grey]) => Math.abs(edges[side] - grey) <= 1), JSON.stringify(edges));
-  await becomes(page, "an anchor and somebody else are drawn", () => pangea.stage.drawn?.anchors.length > 0 && pangea.stage.drawn.others.length > 0);
-  const [T, pixel, other] = await page.evaluate(() => [pangea.walk.pose.T_odom_body, pangea.stage.drawn.anchors[0].pixel, pangea.stage.drawn.others[0].pixel]);
-  check("with its pose, z up", Math.hypot(T[0], T[1], T[2] - 1.5) < 1e-6, String(T));
-  check("an anchor and somebody else are where they belong", Math.hypot(pixel[0] - 239.5, pixel[1] - 319.5) < 0.1 && Math.hypot(other[0] - 364.5, other[1] - 319.5) < 0.1, `${pixel}, ${other}`);
-  check("nothing is recorded without motion", !(await page.locator("#record").isVisible()));
-  await screenshot(page, "webxr");
-  await page.evaluate(() => (window.xrLost = true));
-  await becomes(page, "the hint says when the device is lost", () => /^Lost/.test(document.getElementById("hint").textContent));
-  await page.evaluate(() => (window.xrLost = false));
-  await becomes(page, "and goes on when it is not", () => pangea.walk.pose.state === "tracking");
-  await testXrRotations(page);
-  await page.locator("#stop").click();
-  check("stopping ends the session", (await page.locator("#welcome").isVisible()) && (await page.evaluate(() => xrSession.ended)));
-  check("and frees what it had on the graphics card", (await page.evaluate(() => numSamplers)) === 0);
-  await page.close();
-}
-
-// Only what reads the device's camera has samplers.
-function countSamplers() {
-  window.numSamplers = 0;
-  const { prototype } = WebGL2RenderingContext;
-  for (const [name, more] of [["createSampler", 1], ["deleteSampler", -1]]) {
-    const real = prototype[name];
-    prototype[name] = function (...given) {
-      window.numSamplers += more;
-      return real.apply(this, given);
-    };
-  }
-}
-
-// Stop in AR before the first image does not mean that AR gives no images.
-async function stopBeforeFirstImage(page) {
-  await page.evaluate(() => (window.xrLost = true));
-  await page.locator("#start").click();
-  await becomes(page, "WebXR: one waits until AR finds its way", () => /AR finds its way/.test(document.getElementById("hint").textContent));
-  await page.locator("#stop").click();
-  check("and may stop", await page.evaluate(() => xrSession.ended && document.getElementById("welcome").checkVisibility()));
-  await page.evaluate(() => (window.xrLost = false));
-}
-
-// The screen is rotated there and back while the first agent ends, which takes a second here.
-async function testXrRotations(page) {
-  await page.evaluate(async () => {
-    const { postMessage } = Worker.prototype;
-    Worker.prototype.postMessage = function (message, transfer) {
-      setTimeout(() => postMessage.call(this, message, transfer), message.kind === "close" ? 1000 : 0);
-    };
-    pangea.walk.isOld = true;
-    window.xrSize = { width: 1280, height: 960 };
-    await new Promise((done) => setTimeout(done, 500));
-    window.xrSize = undefined;
-  });
-  await becomes(page, "a rotated screen starts anew", () => !pangea.walk.isOld && pangea.walk.vio?.counters.images > 5);
-  check("with one agent", page.workers().length === 1, page.workers().length);
-}
-
-async function testXrRefused(browser, url) {
-  const page = await openPage(browser, url, { viewport: { width: 360, height: 480 }, permissions: ["camera", "accelerometer", "gyroscope"] }, (page) => page.addInitScript(installFakeXr, { frame_ms: 33, refusedFeature: "camera-access" }));
-  await senseMotion(page);
-  await page.locator("#start").click();
-  await becomes(page, "WebXR without camera images: the page's own odometry", () => Boolean(pangea.calibration));
-  await page.close();
-}
-
-// AR starts, but gives no camera images.
-async function testXrBlind(browser, url) {
-  const page = await openPage(browser, url, { viewport: { width: 360, height: 480 }, permissions: ["camera", "accelerometer", "gyroscope"] }, (page) => page.addInitScript(installFakeXr, { frame_ms: 33 }));
-  await senseMotion(page);
-  await page.evaluate((projection) => {
-    window.xrBlind = true;
-    window.xrSource = () => ({ width: 960, height: 1280, projection, position: { x: 0, y: 0, z: 0 }, orientation: { x: 0, y: 0, z: 0, w: 1 } });
-  }, projectionOf({ width: 960, height: 1280, focal: 1000 }));
-  await page.locator("#start").click();
-  await becomes(page, "AR without camera images ends, and the page says so", () =>
-    /AR gives no camera images/.test(document.getElementById("notice").textContent) && document.getElementById("welcome").checkVisibility());
-  await page.locator("#start").click();
-  await becomes(page, "the next start uses the page's own odometry", () => Boolean(pangea.calibration));
   await page.close();
 }
 
