@@ -1,21 +1,15 @@
-// The gateway with real TLS connections, on buses in this process.
+// The gateway with visitors, agents, and strangers.
 
-#include "gateway/gateway_process.h"
-
-#include <fmt/chrono.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <fstream>
-#include <nlohmann/json.hpp>
 
 #include "agent_handler/agent_handler_process.h"
-#include "bus/process.h"
 #include "files/text_file.h"
-#include "gateway/test_client.h"
+#include "gateway/test_gateway_process.h"
 #include "messages/testing/test_keyframes.h"
 #include "pangea/have_t.hpp"
-#include "pangea/status_t.hpp"
 #include "uplink/uplink_process.h"
 
 namespace pangea {
@@ -25,103 +19,9 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 using testing::ElementsAre;
 using testing::HasSubstr;
-using testing::IsEmpty;
 using testing::Not;
 using testing::SizeIs;
 using testing::StartsWith;
-
-constexpr int64_t kSecond = 1'000'000;
-constexpr int64_t kDay = 86'400 * kSecond;
-const MachineNames kNames{{"localhost"}, {"127.0.0.1"}};
-
-class GatewayProcessTest : public testing::Test {
- protected:
-  GatewayProcessTest() {
-    fs::remove_all(folder_);
-    site_ = site::OpenSite(folder_);
-    MakeGatewayFolders(site_);
-    identity_ = OpenIdentity(site_, kNames, Date());
-    Open(identity_);
-    server_bus_.Subscribe("STATUS_gateway", [this](const std::string&, Bytes data) {
-      EXPECT_TRUE(DecodeMessage(data, &status_));
-    });
-    link_bus_.Subscribe("LINK_UP_[0-9]+", [this](const std::string& channel, Bytes data) {
-      up_.emplace_back(channel, std::string(data.begin(), data.end()));
-    });
-  }
-
-  void Open(const GatewayIdentity& identity) {
-    const auto page = std::make_shared<const std::string>("<p>page");
-    const GatewayProcess::Options options{
-        {"127.0.0.1", 0, {}}, {{"/", {"text/html", page, nullptr}}}, identity, "127.0.0.1"};
-    process_.emplace(link_bus_, server_bus_, site_, options);
-  }
-  void Serve(int rounds = 5) {
-    for (int i = 0; i < rounds; ++i) {
-      process_->Tick(WallUtime() + skipped_us_, Date());
-      process_->Serve(10);
-      link_bus_.Drain();
-      server_bus_.Drain();
-    }
-  }
-  int64_t Date() const { return (WallUtime() + skipped_us_) / kSecond; }
-  // As if so much time had passed, except for sockets.
-  void Skip(int64_t us) {
-    skipped_us_ += us;
-    Serve();
-  }
-  std::string Ask(const std::string& request) {
-    web::TlsClient client(process_->port(), identity_.authority_pem);
-    client.Send(request);
-    std::string answer;
-    for (int i = 0; i < 5; ++i) {
-      Serve(2);
-      answer += client.Received();
-    }
-    return answer;
-  }
-  std::string Post(const std::string& body, const std::string& headers = "") {
-    return Ask(
-        fmt::format("POST /v1/join HTTP/1.1\r\nHost: 127.0.0.1\r\n{}Content-Length: {}\r\n\r\n{}",
-                    headers, body.size(), body));
-  }
-  static json BodyOf(const std::string& answer) {
-    return json::parse(answer.substr(answer.find("\r\n\r\n") + 4), nullptr, false);
-  }
-  static std::string JoinBody(const std::string& code) {
-    return json({{"code", code}, {"name", "Anna"}}).dump();
-  }
-  std::string NewCode() {
-    return Admission(site_).Make({"", AnchorRight::kEditOwn, WallUtime() / kSecond + 3600});
-  }
-  SecretKey KeyOf(int32_t agent_id) {
-    return ReadKeyFileOf(site_.keys() / KeyFileName(agent_id), agent_id);
-  }
-  SecretKey NewKey(int32_t agent_id) {
-    MakeKeyFile(site_.keys() / KeyFileName(agent_id), agent_id);
-    Skip(kSecond);
-    return KeyOf(agent_id);
-  }
-  // The newest status's counter of refusals whose reason begins so.
-  int64_t NumRefused(const std::string& reason) {
-    Skip(kSecond);
-    for (const counter_t& refused : status_.refused) {
-      if (refused.name.starts_with(reason)) {
-        return refused.count;
-      }
-    }
-    return 0;
-  }
-
-  const fs::path folder_ = testing::TempDir() + "/gateway_process";
-  site::Site site_;
-  GatewayIdentity identity_;
-  LocalBus link_bus_, server_bus_;
-  std::optional<GatewayProcess> process_;
-  status_t status_{};
-  std::vector<std::pair<std::string, std::string>> up_;
-  int64_t skipped_us_ = 0;
-};
 
 TEST_F(GatewayProcessTest, AVisitorGetsThePageAndAKeyOnce) {
   EXPECT_THAT(Ask("GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"), HasSubstr("<p>page"));
@@ -248,74 +148,6 @@ TEST_F(GatewayProcessTest, ARecordingIsKeptUnderTheSite) {
   EXPECT_THAT(anna.close_reason(), HasSubstr("_agent_5.zip"));
   EXPECT_EQ(ReadTextFile(site_.recordings() / anna.close_reason()), zip);
   EXPECT_EQ(fs::status(site_.recordings()).permissions(), fs::perms::owner_all);
-}
-
-// The certificate that a new connection gets.
-class CertificateTest : public GatewayProcessTest {
- protected:
-  std::string Certificate() {
-    web::TlsClient client(process_->port());
-    for (int i = 0; i < 10 && client.certificate().empty(); ++i) {
-      Serve(1);
-    }
-    return client.certificate();
-  }
-  // Writes a certificate that a user brings, valid for so many days more; returns its file.
-  std::string WriteOwn(int days) {
-    const int64_t made_s = Date() - (kServerDays - days) * (kDay / kSecond);
-    const Identity own =
-        MakeServerCertificate(MakeAuthority("own", {}, made_s), kNames, made_s).identity;
-    WriteFile("own.pem", own.certificate_chain_pem);
-    WriteFile("own.key", own.private_key_pem);
-    return (folder_ / "own.pem").string();
-  }
-  void WriteFile(const std::string& name, const std::string& text) {
-    std::ofstream(folder_ / name) << text;
-  }
-};
-
-TEST_F(CertificateTest, IsRenewedWhileTheGatewayRuns) {
-  GatewayAgent anna(process_->port(), 5, NewKey(5));
-  for (int i = 0; i < 10 && !anna.proven(); ++i) {
-    Serve(2);
-    anna.Received();
-  }
-  Serve();
-  const std::string first = Certificate();
-  Skip((kServerDays - 31) * kDay);
-  EXPECT_EQ(Certificate(), first);
-  Skip(2 * kDay);
-  const std::string second = Certificate();
-  EXPECT_NE(second, first);
-  EXPECT_TRUE(IsGoodFor({second, ReadTextFile(site_.gateway() / "server.key")},
-                        {identity_.authority_pem, ""}, kNames, Date(), kServerDays - 2));
-  EXPECT_EQ(ReadTextFile(site_.gateway() / "server.pem").substr(0, second.size()), second);
-  Skip(kServerDays * kDay);
-  EXPECT_NE(Certificate(), second);
-  anna.Send(std::vector<uint8_t>{1, 2, 3});
-  Serve();
-  EXPECT_THAT(up_, ElementsAre(testing::Pair("LINK_UP_5", "\1\2\3"))) << "the link was cut";
-}
-
-TEST_F(CertificateTest, StaysWhileItCannotBeRenewed) {
-  const std::string first = Certificate();
-  fs::remove(site_.gateway() / "ca.key");
-  Skip((kServerDays - 29) * kDay);
-  EXPECT_EQ(Certificate(), first);
-  EXPECT_GE(NumRefused((site_.gateway() / "ca.key").string()), 1);
-}
-
-TEST_F(CertificateTest, OfTheUserIsOnlyWarnedAbout) {
-  const std::string file = WriteOwn(31);
-  Open(ReadIdentity(file, (folder_ / "own.key").string()));
-  const std::string first = Certificate();
-  EXPECT_THAT(status_.refused, IsEmpty());
-  Skip(2 * kDay);
-  const std::string date = fmt::format("{:%Y-%m-%d}", fmt::gmtime(ExpiryOf(first)));
-  EXPECT_EQ(NumRefused(fmt::format("{}: this certificate expires on {}", file, date)), 1);
-  Skip(30 * kDay);
-  EXPECT_EQ(NumRefused(fmt::format("{}: this certificate has expired on {}", file, date)), 1);
-  EXPECT_EQ(Certificate(), first);
 }
 
 // While strangers do what they like, an agent's packets go on.
