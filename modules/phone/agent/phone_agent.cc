@@ -53,9 +53,9 @@ void PhoneAgent::Listen() {
   node_.Subscribe<pose_t>(channels::Pose(agent_id_),
                           [this](const std::string&, const pose_t& message) { OnPose(message); });
   node_.Listen<correction_t>(channels::Correction(agent_id_), [this](const Correction& correction) {
-    // Corrections of maps of earlier runs come too. The newest map's is kept.
-    if (!correction_ || correction_->map < correction.map ||
-        (correction_->map == correction.map && correction_->revision < correction.revision)) {
+    // Corrections of maps of earlier runs come too.
+    if (correction.map == map_ &&
+        (!correction_ || correction_->map != map_ || correction_->revision < correction.revision)) {
       correction_ = correction;
     }
   });
@@ -133,7 +133,7 @@ void PhoneAgent::OnPose(const pose_t& message) {
   pose.utime = message.utime;
   pose.state = message.state;
   pose.reason = message.reason;
-  pose.map = Parse(message.map).value.value_or(MapId{});
+  pose.map = map_ = Parse(message.map).value.value_or(MapId{});
   pose.T_odom_body = Parse(message.T_odom_body).value.value_or(Rigid3{});
   pose.num_tracked = message.num_tracked;
   if (correction_ && correction_->map == pose.map && message.group_revision > 0) {

@@ -126,7 +126,8 @@ class PhoneAgent {
   const std::unique_ptr<Odometry> odometry_;
   std::optional<UplinkProcess> uplink_;  // only with a key
   DrawnAnchors anchors_;
-  std::optional<Correction> correction_;  // the newest one of the newest map
+  MapId map_;                             // of the newest pose
+  std::optional<Correction> correction_;  // the newest one of that map, or an earlier map's
   std::deque<TrackedMap> tracked_;        // the newest kMaxTrackedMaps, newest last
   std::set<KeyframeId> spooled_;
   int64_t now_us_ = 0;

@@ -18,6 +18,7 @@ namespace {
 constexpr int64_t kStart_us = 1'700'000'000'000'000;
 constexpr char kKeyHex[] = "000102030405060708090a0b0c0d0e0f101112131415161718191a1b1c1d1e1f";
 const MapId kOldMap{7, kStart_us - 60'000'000};
+const MapId kLaterMap{7, kStart_us + 60'000'000};  // of an earlier run, when the clock was wrong
 
 AgentTexts Texts() {
   AgentTexts texts;
@@ -185,7 +186,7 @@ TEST_F(PhoneAgentTest, ItHearsWhereTheOthersAre) {
   EXPECT_EQ(others_->others[1].agent_id, 4);
 }
 
-TEST_F(PhoneAgentTest, ACorrectionOfAnEarlierMapLeavesTheGroupOfThisOne) {
+TEST_F(PhoneAgentTest, ACorrectionOfAnotherRunsMapLeavesTheGroupOfThisOne) {
   const MapId map{7, kStart_us};
   const auto pose_at = [this](int64_t utime) {
     agent_.AddImage(utime, cv::Mat(48, 64, CV_8U, cv::Scalar(0)));
@@ -195,13 +196,14 @@ TEST_F(PhoneAgentTest, ACorrectionOfAnEarlierMapLeavesTheGroupOfThisOne) {
     Run(0.1);
     return pose_;
   };
-  for (const MapId& known : {kOldMap, map}) {
+  for (const MapId& known : {kOldMap, kLaterMap, map}) {
     agent_.Restore(ToString(known), EncodeTestKeyframe({known, 0}));
   }
   Run(2);
   pose_at(1'000'000);  // opens the map
   const Eigen::Matrix<double, 6, 6> covariance = 1e-4 * Eigen::Matrix<double, 6, 6>::Identity();
-  for (const auto& [corrected, revision] : {std::pair(map, 3), std::pair(kOldMap, 9)}) {
+  for (const auto& [corrected, revision] :
+       {std::pair(map, 3), std::pair(kOldMap, 9), std::pair(kLaterMap, 9)}) {
     Correction correction;
     correction.map = corrected;
     correction.group = kOldMap;
@@ -210,7 +212,7 @@ TEST_F(PhoneAgentTest, ACorrectionOfAnEarlierMapLeavesTheGroupOfThisOne) {
     Run(1);
     PublishMessage(server_bus_, "CORRECTION_7", ToMessage(correction));
   }
-  // The server tells both, again and again.
+  // The server tells all, again and again.
   for (int64_t utime = 1'100'000; utime < 3'000'000; utime += 50'000) {
     const std::optional<PhonePose> pose = pose_at(utime);
     ASSERT_TRUE(pose && pose->utime == utime) << utime;
