@@ -30,7 +30,7 @@ export class Recorder {
 
   // The caller may close the picture when this returns.
   addImage({ utime, picture, width, height }: CameraImage) {
-    if (this.encoding.size >= kMaxEncoding) {
+    if (this.writer.isFull || this.encoding.size >= kMaxEncoding) {
       ++this.numLeftOut;
       return;
     }

@@ -73,3 +73,11 @@ test("what the writer writes, the reader reads", async () => {
   assert.deepEqual([...(await files.read(images[0].name))], [1, 2, 3]);
   assert.deepEqual([cameraYaml, imuYaml], [kCamera, kImu]);
 });
+
+test("a recording that is too long for a zip is readable up to there", async () => {
+  const writer = new RecordingWriter("long");
+  for (let i = 0; i < 70_000 && !writer.isFull; ++i) writer.addImage(1700000000000000 + i, new Uint8Array([1]), "jpg");
+  assert.ok(writer.numImages > 50_000);
+  const { names } = await filesOfZip(writer.finish(kCamera, kImu));
+  assert.equal(names.length, writer.numImages + 4);
+});

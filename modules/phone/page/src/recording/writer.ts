@@ -5,6 +5,9 @@ import { strToU8, Zip, ZipDeflate, ZipPassThrough } from "fflate";
 import type { ImuSample } from "./euroc";
 
 const kPartBytes = 4_000_000;
+// Below the bounds of a zip: 65,535 files and 4 GiB.
+const kMaxImages = 65_000; // 36 minutes at 30 Hz
+const kMaxBytes = 4_000_000_000;
 
 const nanoseconds = (utime: number) => `${utime}000`;
 
@@ -12,6 +15,7 @@ export class RecordingWriter {
   private readonly parts: Blob[] = [];
   private recent: Uint8Array<ArrayBuffer>[] = [];
   private recentBytes = 0;
+  private bytes = 0;
   private readonly zip: Zip;
   private readonly imageRows = ["#timestamp [ns],filename"];
   private readonly imuRows = [
@@ -27,6 +31,11 @@ export class RecordingWriter {
       if (error) this.failure = error;
       else this.keep(data as Uint8Array<ArrayBuffer>);
     });
+  }
+
+  // No further image may be added.
+  get isFull(): boolean {
+    return this.numImages >= kMaxImages || this.bytes >= kMaxBytes;
   }
 
   // `extension`: the format of `encoded`, jpg or png.
@@ -56,6 +65,7 @@ export class RecordingWriter {
 
   private keep(data: Uint8Array<ArrayBuffer>) {
     this.recent.push(data);
+    this.bytes += data.length;
     this.recentBytes += data.length;
     if (this.recentBytes < kPartBytes) return;
     this.parts.push(new Blob(this.recent));
