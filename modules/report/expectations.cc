@@ -175,11 +175,11 @@ CheckedExpectation CheckOne(const Kind& kind, double bound, const Values& metric
   for (const Value& value : metrics) {
     checked.value +=
         fmt::format("{}{}{}", checked.value.empty() ? "" : ", ", value.of,
-                    value.value ? fmt::format("{:.4g}{}", *value.value, kind.unit) : "none");
+                    value.value ? fmt::format("{:.4g}{}", *value.value, kind.unit) : "no value");
     checked.met &= value.value && Met(kind.relation, bound, *value.value);
   }
   if (metrics.empty()) {
-    checked.value = "none";
+    checked.value = "no value";
     checked.met = false;
   }
   return checked;

@@ -85,7 +85,7 @@ TEST(Expectations, AMapMayLeaveWhileItsAgentStays) {
 TEST(Expectations, AMetricThatIsNotThereMisses) {
   const CheckedExpectation server = Only({{"ate_server_m", 1}}, Report());
   EXPECT_FALSE(server.met);
-  EXPECT_EQ(server.value, "agent 1: 0.02 m, agent 2: none");
+  EXPECT_EQ(server.value, "agent 1: 0.02 m, agent 2: no value");
   ordered_json nothing = Report();
   nothing["agents"] = ordered_json::array();
   nothing["groups"] = ordered_json::array();
@@ -94,6 +94,8 @@ TEST(Expectations, AMetricThatIsNotThereMisses) {
   for (const char* name : {"ate_joint_m", "wrong_constraints", "fused_by", "maps", "coverage"}) {
     EXPECT_FALSE(Met(name, 1, nothing)) << name;
   }
+  // "none" would read as if there were no wrong ones.
+  EXPECT_EQ(Only({{"wrong_constraints", 0}}, nothing).value, "no value");
 }
 
 TEST(Expectations, TheWorstAnchorCounts) {
@@ -118,7 +120,7 @@ TEST(Expectations, AnAnchorThatIsNotShownMissesAndOneThatIsNotLookedAtDoesNot) {
   ordered_json alone = Report();
   alone["anchors"][1]["agents"] = ordered_json::array();
   EXPECT_EQ(Only({{"anchor_error_m", 1}}, alone).value,
-            "kettle at agent 2: 0.01 m, kettle at agent 3: 0.02 m, pot: none");
+            "kettle at agent 2: 0.01 m, kettle at agent 3: 0.02 m, pot: no value");
   EXPECT_FALSE(Met("anchor_error_m", 1, alone));
   alone["anchors"] = ordered_json::array();
   EXPECT_FALSE(Met("anchor_error_m", 1, alone));
