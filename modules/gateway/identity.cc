@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <system_error>
 
 #include "files/text_file.h"
 #include "files/whole_file.h"
@@ -117,7 +118,13 @@ void WriteAddress(const site::Site& site, const GatewayAddress& address) {
 
 GatewayAddress ReadAddress(const site::Site& site) {
   const fs::path file = site.gateway() / "address.json";
-  if (!Exists(file)) {
+  std::error_code error;
+  const bool is_there = fs::exists(file, error);
+  if (error) {
+    throw std::runtime_error(fmt::format("{}: cannot be read: {}; run as the site's owner",
+                                         file.string(), error.message()));
+  }
+  if (!is_there) {
     throw std::runtime_error(
         fmt::format("{}: is not there: the gateway never ran on this site; start it first: "
                     "pangea-server --site {} --phone",

@@ -157,6 +157,17 @@ TEST_F(IdentityTest, TheAddressIsToldToThoseWhoInvite) {
   EXPECT_THROW(ReadAddress(site_), std::runtime_error);
 }
 
+TEST_F(IdentityTest, AnAddressThatCannotBeReadIsNotTakenForMissing) {
+  // A link to itself fails for root, too, whom permissions do not stop.
+  fs::create_symlink("address.json", site_.gateway() / "address.json");
+  try {
+    ReadAddress(site_);
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("address.json: cannot be read: "));
+  }
+}
+
 TEST(MachineNames, AreThoseOfThisMachine) {
   const MachineNames names = NamesOfThisMachine();
   EXPECT_THAT(names.hosts, Contains("localhost"));
