@@ -70,8 +70,10 @@ void WebServer::Impl::Listen() {
     acceptor.listen(asio::socket_base::max_listen_connections, error);
   }
   if (error) {
-    throw std::runtime_error(fmt::format("cannot listen on {} port {} ({}): give another port",
-                                         options.listen, options.port, error.message()));
+    const bool is_foreign = error == boost::system::errc::address_not_available;
+    throw std::runtime_error(
+        fmt::format("cannot listen on {} port {} ({}): give {}", options.listen, options.port,
+                    error.message(), is_foreign ? "an address of this machine" : "another port"));
   }
 }
 

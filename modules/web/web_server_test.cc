@@ -9,6 +9,7 @@
 #include <chrono>
 #include <ctime>
 #include <memory>
+#include <stdexcept>
 #include <string>
 
 #include "web/testing/web_client.h"
@@ -121,6 +122,19 @@ TEST_F(WebServerTest, GivesTheSitesAnswerAndLetsItLoadNothing) {
   EXPECT_THAT(answer, HasSubstr("<p>page"));
   EXPECT_THAT(answer, HasSubstr("Content-Security-Policy: default-src 'none'"));
   EXPECT_THAT(answer, Not(HasSubstr("Vary")));
+}
+
+TEST_F(WebServerTest, SaysWhetherTheAddressOrThePortIsWrong) {
+  const auto why_not = [this](const WebOptions& options) -> std::string {
+    try {
+      WebServer second(options, site_);
+      return "";
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+  };
+  EXPECT_THAT(why_not({"127.0.0.1", server_.port(), {}}), HasSubstr("give another port"));
+  EXPECT_THAT(why_not({"192.0.2.1", 0, {}}), HasSubstr("give an address of this machine"));
 }
 
 TEST_F(WebServerTest, AHeadIsAGetWithoutItsBody) {
