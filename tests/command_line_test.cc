@@ -187,6 +187,16 @@ TEST(Link, ItsTwoSidesDiffer) {
   }
 }
 
+TEST(Server, ItsBusesAreCheckedBeforeAProcessStarts) {
+  for (const char* urls : {"--bus udp://239.255.76.67:7667", "--link udpm://10.0.0.1:7668"}) {
+    const Outcome outcome =
+        RunCommand(fmt::format("timeout 10 pangea-server --journal none --keys none {}", urls));
+    EXPECT_EQ(outcome.exit_code, 1) << urls;
+    EXPECT_THAT(outcome.output, HasSubstr("give udpm://GROUP:PORT")) << urls;
+    EXPECT_THAT(outcome.output, Not(HasSubstr("started"))) << urls;
+  }
+}
+
 // Otherwise the report would lack ground truth, as if the recording had none.
 TEST(Session, ARecordingThatIsGivenIsThere) {
   const Outcome outcome =

@@ -34,26 +34,6 @@ bool IsOurs(const std::string& name) {
          name == "site.yaml.new" || name.starts_with("journal.lcm");
 }
 
-// Checks a URL as LcmBus does when it opens it, but without a network; only buses that several
-// processes can share.
-std::string WhyNoBus(const std::string& url) {
-  if (url.starts_with("tcpq://")) {
-    return "";
-  }
-  if (!url.starts_with("udpm://")) {
-    return fmt::format(
-        "'{}' is no LCM URL between processes: give udpm://GROUP:PORT?ttl=N, or "
-        "tcpq://HOST:PORT",
-        url);
-  }
-  try {
-    ParseUdpmUrl(url);
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
-  return "";
-}
-
 void CheckDescription(const fs::path& file, const SiteDescription& description) {
   const auto refuse = [&](const std::string& what) {
     throw std::runtime_error(fmt::format("{}: {}", file.string(), what));
@@ -139,6 +119,24 @@ int ReadPid(int fd) {
 }
 
 }  // namespace
+
+std::string WhyNoBus(const std::string& url) {
+  if (url.starts_with("tcpq://")) {
+    return "";
+  }
+  if (!url.starts_with("udpm://")) {
+    return fmt::format(
+        "'{}' is no LCM URL between processes: give udpm://GROUP:PORT?ttl=N, or "
+        "tcpq://HOST:PORT",
+        url);
+  }
+  try {
+    ParseUdpmUrl(url);
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "";
+}
 
 std::string NameOfFolder(const fs::path& folder) {
   return fs::absolute(folder / "").parent_path().filename();

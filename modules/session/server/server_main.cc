@@ -120,6 +120,13 @@ void UseProcessOptions(Arguments* arguments) {
   }
 }
 
+// Otherwise each process would refuse the URL, again after each of its starts.
+void RequireBus(const std::string& option, const std::string& url) {
+  if (const std::string why = site::WhyNoBus(url); !why.empty()) {
+    throw std::runtime_error(fmt::format("{}: {}", option, why));
+  }
+}
+
 int RunWorker(Arguments* arguments) {
   ServerOptions& options = arguments->options;
   if (options.cluster.nats.empty()) {
@@ -128,6 +135,7 @@ int RunWorker(Arguments* arguments) {
   options.cluster.site = arguments->worker;
   options.bus = options.bus.empty() ? kWorkerBusUrl : options.bus;
   options.logs = options.logs.empty() ? "worker.logs" : options.logs;
+  RequireBus("--bus", options.bus);
   UseProcessOptions(arguments);
   return ServeAsWorker(options);
 }
@@ -147,6 +155,8 @@ int Run(Arguments* arguments) {
   }
   UseDefaults(&options);
   RequireTwoUrls("--bus", options.bus, "--link", options.link);
+  RequireBus("--bus", options.bus);
+  RequireBus("--link", options.link);
   UseProcessOptions(arguments);
   if (!options.cluster.nats.empty()) {
     if (options.cluster.site.empty()) {
