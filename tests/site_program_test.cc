@@ -101,6 +101,7 @@ serve_until both "grep -q 'posegraph: 2 maps in 1 groups' both/logs/posegraph.tx
       folder.string(), Buses(), PANGEA_SOURCE_DIR);
   const std::string said = RunCommand("sh " + (folder / "run.sh").string()).output;
   EXPECT_THAT(said, HasSubstr("both: 32 keyframes of day_1, 31 of day_2"));
+  EXPECT_THAT(said, HasSubstr("no agent can join yet: both/keys has no keys"));
   EXPECT_THAT(said, Not(HasSubstr("never")));
 }
 

@@ -41,6 +41,12 @@ void NoteLoss(const fs::path& of, int64_t bytes) {
   }
 }
 
+void NoteNoKeys(const Site& site) {
+  if (fs::is_empty(site.keys())) {
+    std::cout << fmt::format("no agent can join yet: {} has no keys\n", site.keys().string());
+  }
+}
+
 void List(const std::string& folder) {
   const std::vector<fs::path> folders =
       folder.empty() ? DefaultSiteFolders() : std::vector<fs::path>{folder};
@@ -79,6 +85,7 @@ void RunRestore(const Arguments& arguments) {
   const BackupSummary summary = Restore(arguments.other, arguments.site);
   std::cout << fmt::format("{}: {:.1f} MB of journal, {} events\n", arguments.site,
                            Megabytes(summary.journal_bytes), summary.events);
+  NoteNoKeys(ReadSite(arguments.site));
   NoteLoss(arguments.site, summary.lost_bytes);
 }
 
@@ -90,6 +97,7 @@ void RunMerge(const Arguments& arguments) {
       summary.keyframes_first, arguments.site, summary.keyframes_second, arguments.other,
       summary.anchor_edits, summary.maps_in_both);
   std::cout << "the server that starts on it looks for places that both have\n";
+  NoteNoKeys(ReadSite(arguments.out));
   NoteLoss(arguments.out, summary.bytes_lost);
 }
 
