@@ -161,7 +161,7 @@ class Bus:
 
 
 def image_chunks(utime, png, width, height):
-    """Yields the messages of one image for IMAGE_k. `png`: a PNG file, `utime`: microseconds."""
+    """Yields the messages of one image for IMAGE_k. `png`: a PNG or JPEG file, `utime`: microseconds."""
     pieces = [png[i:i + _MAX_IMAGE_CHUNK] for i in range(0, len(png), _MAX_IMAGE_CHUNK)]
     for i, piece in enumerate(pieces):
         chunk = image_t()
