@@ -188,7 +188,7 @@ std::vector<Picture> Pictures(const ReportMetrics& metrics) {
       const std::string file = pictures.empty()
                                    ? "trajectory.png"
                                    : fmt::format("trajectory.{}.png", FileName(group.group.frame));
-      pictures.push_back({file, TopViewPlot(GroupTitle(group) + ", in its own map frame")});
+      pictures.push_back({file, TopViewPlot(GroupTitle(group) + ", in the group's map frame")});
       AddGroup(metrics, group, &pictures.back().plot);
     }
   }

@@ -258,7 +258,8 @@ ReportMetrics ComputeMetrics(const ReportInput& input, const CapturedSession& se
         fmt::format("{} MAP_STATE lack a chunk in the log; ignored", session.incomplete_states));
   }
   for (const auto& [process, count] : input.restarts) {
-    metrics.notes.push_back(fmt::format("{} died and was restarted, {} times", process, count));
+    metrics.notes.push_back(fmt::format("{} died and was restarted{}", process,
+                                        count == 1 ? "" : fmt::format(", {} times", count)));
   }
   for (FinalGroup& group : FinalGroups(session)) {
     metrics.groups.push_back({std::move(group), std::nullopt, {}});
