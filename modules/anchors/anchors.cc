@@ -276,6 +276,14 @@ std::optional<Anchors::NearKeyframe> Anchors::NearestKeyframe(const MapId& group
   return nearest;
 }
 
+std::optional<int64_t> Anchors::NewestUtime(const MapId& map) const {
+  const auto track = tracks_.find(map);
+  if (track == tracks_.end() || track->second.keyframes().empty()) {
+    return std::nullopt;
+  }
+  return track->second.keyframes().rbegin()->second.utime;
+}
+
 RecordCounters Anchors::store_counters() const {
   RecordCounters sum;
   for (const auto& [map, track] : tracks_) {

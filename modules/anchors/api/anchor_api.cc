@@ -20,6 +20,8 @@ using web::WebAnswer;
 
 // Further away from all keyframes, a small rotation would displace the anchor too far.
 constexpr double kMaxFromKeyframe_m = 1000;
+// A keyframe that is on its way is not so much newer: the time has another unit or clock.
+constexpr int64_t kMaxAhead_us = 86'400'000'000;
 
 }  // namespace
 
@@ -314,6 +316,13 @@ BadField AnchorApi::SetPose(const PoseBehindPixel& pose, AnchorEdit* edit) const
       std::ranges::find_if(maps, [&](const MapId& id) { return id.agent_id == pose.agent_id; });
   if (map == maps.end()) {
     return {"pose.agent", "the server has no map of this agent: /v1/agents has those there are"};
+  }
+  // The anchor would wait for ever.
+  if (const auto newest = anchors_.NewestUtime(*map);
+      newest && pose.utime - *newest > kMaxAhead_us) {
+    return {"pose.utime",
+            "is more than a day after the agent's newest keyframe: give microseconds of its "
+            "sensor clock"};
   }
   edit->placement = AnchorEdit::Placement::kPixel;
   edit->map = *map;

@@ -105,6 +105,9 @@ TEST_F(AnchorApiTest, WhatCannotBePlacedIsRefusedBeforeItIsJournalled) {
       {fmt::format(R"({{"agent": 1, "utime": {}, "pixel": [-5000, 2]}})",
                    world_.agents[0].keyframes[5].utime),
        "pose", "no surface"},
+      {fmt::format(R"({{"agent": 1, "utime": {}, "pixel": [1, 2]}})",
+                   world_.agents[0].keyframes[5].utime + 200'000'000'000),
+       "pose.utime", "microseconds"},
       {R"({"group": "1/17", "position": [0, 0]})", "pose.position", "[x, y, z]"},
   };
   for (const auto& c : kCases) {
