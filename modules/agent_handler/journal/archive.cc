@@ -88,6 +88,8 @@ Archive::Archive(Node& node, const std::string& journal_path, int64_t now_utime,
       [this](const std::string&, const resend_request_t& message) { OnResendRequest(message); });
   node_.Listen<verdict_request_t>(channels::kVerificationRequest,
                                   std::bind_front(&Archive::OnVerificationRequest, this));
+  node_.Listen<journal_file_t>(channels::kJournalFile,
+                               std::bind_front(&Archive::OnJournalFile, this));
   node_.Listen<journal_file_t>(channels::kJournalReplicated, [this](const JournalFile& file) {
     replication_->OnReplicated(file.state.num_bytes, now_us_);
   });
@@ -326,8 +328,21 @@ std::string Archive::Damage() const {
 
 void Archive::PublishJournalFile() {
   node_.Publish(std::string(channels::kJournalFile),
-                ToMessage(JournalFile{std::filesystem::absolute(journal_->path()).string(),
-                                      journal_->state()}));
+                ToMessage(JournalFile{JournalPath(), journal_->state()}));
+}
+
+// The processes of two servers on one bus take each other's keyframes, matches and corrections.
+void Archive::OnJournalFile(const JournalFile& file) {
+  if (file.path != JournalPath()) {
+    node_.Refuse(
+        fmt::format("another server is on this bus, with the journal {}: give each server "
+                    "a --bus of its own",
+                    file.path));
+  }
+}
+
+std::string Archive::JournalPath() const {
+  return std::filesystem::absolute(journal_->path()).string();
 }
 
 void Archive::PublishHave() {

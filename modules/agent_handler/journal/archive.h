@@ -6,7 +6,7 @@
 //   server bus: KEYFRAME_k (once the disk has it), HAVE, AGAIN_*, RESEND_REQUEST,
 //               JOURNAL_FILE, VERDICT_REQUEST out, and what anchor_edits.h says;
 //               PLACE_MATCH, CONSTRAINT, RESEND_REQUEST, VERDICT_REQUEST, AGAIN_<node's name>,
-//               OPTIONS_*, JOURNAL_REPLICATED in
+//               OPTIONS_*, JOURNAL_REPLICATED, JOURNAL_FILE of another server in
 // The options of a process are journalled when it starts with other options than before.
 
 #include <cstdint>
@@ -88,6 +88,8 @@ class Archive {
   void OnOptions(const std::string& channel, Bytes data);
   void WriteDue();
   void PublishJournalFile();
+  void OnJournalFile(const JournalFile& file);
+  std::string JournalPath() const;
   void NoteJournalled(const KeyframeId& id);
   std::vector<SeqGap> Lost(const MapId& map) const;
   bool LoadEvent(const std::string& channel, Bytes data, const JournalPlace& place);

@@ -105,5 +105,25 @@ TEST_F(JournalFileTest, AFollowerOnTheSameHostHasWhatAFarOneIsSentAndAsksForNoth
   EXPECT_GT(far.resends_asked(), 0);
 }
 
+TEST_F(JournalFileTest, AnotherServerOnTheBusIsTold) {
+  std::string refused;
+  bus.Subscribe("STATUS_agent_handler", [&](const std::string&, Bytes data) {
+    status_t status{};
+    ASSERT_GE(status.decode(data.data(), 0, static_cast<int>(data.size())), 0);
+    for (const counter_t& reason : status.refused) {
+      refused += reason.name + "\n";
+    }
+  });
+  const auto handler = StartHandler();
+  Run(handler.get(), {}, 3);
+  EXPECT_EQ(refused, "") << "its own journal";
+  PublishMessage(bus, std::string(channels::kJournalFile),
+                 ToMessage(JournalFile{"/elsewhere/journal.lcm", {}}));
+  Run(handler.get(), {}, 3);
+  EXPECT_NE(refused.find("another server is on this bus, with the journal /elsewhere/journal.lcm"),
+            std::string::npos)
+      << refused;
+}
+
 }  // namespace
 }  // namespace pangea
