@@ -276,12 +276,11 @@ std::optional<Anchors::NearKeyframe> Anchors::NearestKeyframe(const MapId& group
   return nearest;
 }
 
-std::optional<int64_t> Anchors::NewestUtime(const MapId& map) const {
+const TrackedKeyframe* Anchors::NewestKeyframe(const MapId& map) const {
   const auto track = tracks_.find(map);
-  if (track == tracks_.end() || track->second.keyframes().empty()) {
-    return std::nullopt;
-  }
-  return track->second.keyframes().rbegin()->second.utime;
+  return track == tracks_.end() || track->second.keyframes().empty()
+             ? nullptr
+             : &track->second.keyframes().rbegin()->second;
 }
 
 RecordCounters Anchors::store_counters() const {

@@ -86,8 +86,8 @@ class Anchors {
   };
   std::optional<NearKeyframe> NearestKeyframe(const MapId& group,
                                               const Eigen::Vector3d& p_map) const;
-  // utime of the map's newest keyframe; empty for a map without keyframes.
-  std::optional<int64_t> NewestUtime(const MapId& map) const;
+  // Null for a map without keyframes.
+  const TrackedKeyframe* NewestKeyframe(const MapId& map) const;
   // The placement that an edit would have, with the present maps.
   PlacementResult Try(const AnchorEdit& edit) const;
 

@@ -317,12 +317,15 @@ BadField AnchorApi::SetPose(const PoseBehindPixel& pose, AnchorEdit* edit) const
   if (map == maps.end()) {
     return {"pose.agent", "the server has no map of this agent: /v1/agents has those there are"};
   }
-  // The anchor would wait for ever.
-  if (const auto newest = anchors_.NewestUtime(*map);
-      newest && pose.utime - *newest > kMaxAhead_us) {
+  const TrackedKeyframe* const newest = anchors_.NewestKeyframe(*map);
+  if (newest != nullptr && pose.utime - newest->utime > kMaxAhead_us) {  // it would wait for ever
     return {"pose.utime",
             "is more than a day after the agent's newest keyframe: give microseconds of its "
             "sensor clock"};
+  }
+  if (newest != nullptr && !newest->camera->Contains(pose.pixel)) {
+    return {"pose.pixel", fmt::format("is outside the agent's image, which has {} x {} pixels",
+                                      newest->camera->width, newest->camera->height)};
   }
   edit->placement = AnchorEdit::Placement::kPixel;
   edit->map = *map;
