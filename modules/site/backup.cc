@@ -13,6 +13,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <set>
 #include <stdexcept>
 
 #include "files/progress.h"
@@ -240,6 +241,11 @@ int64_t WriteFolder(std::vector<Source> sources, const Site& site, const fs::pat
 }  // namespace
 
 BackupSummary BackUp(const Site& site, const fs::path& to, bool with_keys) {
+  const std::set<std::string> archives{".zip", ".tar", ".gz", ".tgz", ".zst", ".xz", ".7z"};
+  if (!IsArchive(to) && archives.contains(to.extension())) {
+    throw std::runtime_error(
+        fmt::format("{}: is no name for a folder; an archive is NAME{}", to.string(), kArchiveEnd));
+  }
   const WholePart journal = FindWholePart(site.journal());
   const std::vector<Source> sources = SourcesOf(site, with_keys, journal);
   BackupSummary summary{journal.bytes, journal.events, journal.lost_bytes, 0};

@@ -125,6 +125,11 @@ TEST_P(BackupTest, OverwritesNothing) {
   EXPECT_THAT(WhyNot([&] { Restore(copy, site.folder); }), HasSubstr("nothing is overwritten"));
 }
 
+TEST_P(BackupTest, MakesNoFolderThatIsNamedAsAnArchive) {
+  EXPECT_THAT(WhyNot([&] { BackUp(site, copy.string() + ".zip", false); }),
+              HasSubstr("an archive is NAME.tar.zst"));
+}
+
 TEST_P(BackupTest, LeavesNothingOnAFullDisk) {
   EXPECT_THAT(OnFullDisk(300'000, [&] { BackUp(site, copy, false); }),
               HasSubstr("cannot be written"));
