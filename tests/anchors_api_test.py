@@ -299,7 +299,7 @@ class AnchorsApi(unittest.TestCase):
         tap = self.make(pose={"agent": 1, "utime": keyframe.utime, "pixel": pixel})
         self.assertIsNotNone(tap["pose"])
         status, said = self.request("POST", "/v1/anchors", {"name": "far", "pose": {"agent": 1, "utime": keyframe.utime, "pixel": [-9000, 1]}})
-        self.assertEqual((status, said["field"]), (400, "pose"))
+        self.assertEqual((status, said["field"]), (400, "pose.pixel"))
         for each in (anchor, tap):
             self.request("DELETE", f"/v1/anchors/{each['id']}")
 

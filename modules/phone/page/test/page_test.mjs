@@ -29,8 +29,15 @@ async function testLive(browser, url) {
   await page.locator("#stop").click();
   check("stopping leads back", await page.locator("#welcome").isVisible());
   await testKeptCalibration(page);
-  await page.close();
+  await stopAndClose(page);
   return zip;
+}
+
+// Chromium warns of an image that is in the page's hands when the page is closed.
+async function stopAndClose(page) {
+  await page.evaluate(() => document.getElementById("stop").click());
+  await page.waitForFunction(() => document.getElementById("welcome").checkVisibility());
+  await page.close();
 }
 
 async function testCalibration(page) {
@@ -293,7 +300,7 @@ async function testUpload(browser, url) {
   await becomes(page, "the second is kept", () => /keeps it as walk\.zip/.test(document.getElementById("notice").textContent));
   const files = Object.keys(unzipSync(Buffer.concat(uploads[1].slice(2))));
   check("whole", files.filter((name) => name.endsWith(".jpg")).length > 5 && files.some((name) => name.endsWith("imu0/data.csv")), `${files.length} files`);
-  await page.close();
+  await stopAndClose(page);
 }
 
 async function testPlaying(browser, url, zip) {

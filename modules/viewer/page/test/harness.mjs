@@ -46,6 +46,10 @@ export const launch = (more = []) =>
   });
 
 const consoleErrors = [];
+function noteError(text) {
+  consoleErrors.push(text);
+  console.log(`       the browser's console: ${text}`); // between the checks, where it happened
+}
 
 // `prepare` is called with the page before it is loaded.
 export async function openPage(browser, url, context = {}, prepare = async () => {}) {
@@ -53,9 +57,9 @@ export async function openPage(browser, url, context = {}, prepare = async () =>
     await browser.newContext({ viewport: { width: 1280, height: 800 }, ...context })
   ).newPage();
   page.on("console", (message) => {
-    if (["error", "warning"].includes(message.type())) consoleErrors.push(message.text());
+    if (["error", "warning"].includes(message.type())) noteError(message.text());
   });
-  page.on("pageerror", (error) => consoleErrors.push(String(error)));
+  page.on("pageerror", (error) => noteError(String(error)));
   await prepare(page);
   await page.goto(url);
   return page;
