@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/median.h"
+
 namespace pangea {
 namespace {
 
@@ -19,9 +21,9 @@ constexpr double kRoughness = 0.8;
 constexpr double kExponent = 1.5;
 // How many points kRoughness counts for, against the roughness that the points themselves show.
 constexpr double kPriorPoints = 8;
-constexpr double kOutlier = 2;  // standard deviations
+constexpr double kOutlier = 2;  // standardised residual of a point
 constexpr int kIterations = 2;
-constexpr double kMostSquares = 16;  // that a single point says of the roughness
+constexpr double kMaxChi2 = 16;  // of a single point, in the estimate of the roughness
 constexpr double kLeastRelativeSigma = 1e-6;
 constexpr double kMaxRelativeSigma = 0.15;
 
@@ -32,12 +34,6 @@ struct Kriging {
   VectorXd semivariance;  // to the ray
   MatrixXd semivariances;
 };
-
-double Median(VectorXd values) {
-  const auto middle = values.begin() + values.size() / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 Kriging Prepare(const Eigen::Vector2d& ray, const std::vector<SurfacePoint>& points) {
   const auto count = static_cast<Eigen::Index>(points.size());
@@ -50,7 +46,8 @@ Kriging Prepare(const Eigen::Vector2d& ray, const std::vector<SurfacePoint>& poi
           (points[static_cast<size_t>(i)].ray - points[static_cast<size_t>(j)].ray).norm();
     }
   }
-  const double scale = Median(kriging.inverse_depth);
+  const double scale =
+      Median(std::vector<double>(kriging.inverse_depth.begin(), kriging.inverse_depth.end()));
   for (Eigen::Index i = 0; i < count; ++i) {
     const double sigma =
         std::max(points[static_cast<size_t>(i)].sigma, kLeastRelativeSigma * scale);
@@ -80,16 +77,16 @@ void LearnFromResiduals(const VectorXd& variance, Kriging* kriging) {
   const MatrixXd inverse = InverseOfEquations(*kriging).topLeftCorner(count, count);
   const Eigen::ArrayXd information = inverse.diagonal().array().max(1e-300);
   const Eigen::ArrayXd residual = (inverse * kriging->inverse_depth).array() / information;
-  const Eigen::ArrayXd squares = residual.square() * information;
+  const Eigen::ArrayXd chi2 = residual.square() * information;
   const Eigen::ArrayXd weight =
       1 / (1 + kriging->distance.array() / std::max(kriging->distance.mean(), 1e-9));
-  const double mean = (weight * squares.min(kMostSquares)).sum() / weight.sum();
+  const double mean = (weight * chi2.min(kMaxChi2)).sum() / weight.sum();
   const double factor = (mean * static_cast<double>(count) + kPriorPoints) /
                         (static_cast<double>(count) + kPriorPoints);
   kriging->semivariance *= factor;
   kriging->semivariances *= factor;
   for (Eigen::Index i = 0; i < count; ++i) {
-    const bool outlier = squares[i] > kOutlier * kOutlier;
+    const bool outlier = chi2[i] > kOutlier * kOutlier;
     kriging->variance[i] =
         variance[i] + (outlier ? residual[i] * residual[i] / (kOutlier * kOutlier) : 0.0);
   }

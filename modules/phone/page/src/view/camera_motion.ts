@@ -1,5 +1,5 @@
-// The motion of a camera with a rolling shutter while it reads an image out. The agent's pose is that of the first row; while one turns
-// by 1 rad/s, the last row of a phone's camera sees things 10 pixels from there.
+// The motion of a camera with a rolling shutter while it reads an image out. The agent's pose is that of the first row; while it
+// rotates at 1 rad/s, the last row of a phone's camera sees things 10 pixels from there.
 
 import { Matrix4, Quaternion, Vector3 } from "three";
 import type { AgentPose } from "../agent/phone_agent";
