@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "bus/wall_clock.h"
+
 namespace pangea::session {
 
 bool QuickDeaths::Note(const std::string& why, double ran_s) {
@@ -16,6 +18,14 @@ bool QuickDeaths::Note(const std::string& why, double ran_s) {
   count_ = why == why_ ? count_ + 1 : 1;
   why_ = why;
   return count_ >= kMaxQuickDeaths;
+}
+
+int RecentEnds::Note(double now_s) {
+  ends_s_.push_back(now_s);
+  while (ends_s_.front() <= now_s - kWindow_s) {
+    ends_s_.pop_front();
+  }
+  return static_cast<int>(ends_s_.size());
 }
 
 KeptProcesses::KeptProcesses(std::filesystem::path logs) : logs_(std::move(logs)) {}
@@ -51,7 +61,7 @@ std::vector<KeptProcesses::Revived> KeptProcesses::Revive() {
     }
     std::string why = kept.child->HowItEnded();
     if (!std::exchange(kept.expects_end, false)) {
-      ++kept.unexpected;
+      kept.unexpected = kept.recent_ends.Note(1e-6 * static_cast<double>(SteadyMicros()));
       kept.given_up =
           kept.quick_deaths.Note(why, kept.child->RanSeconds()) || kept.unexpected > kMaxRestarts;
     }

@@ -1,8 +1,8 @@
 #pragma once
 
 // The processes that a session keeps alive: a process that ends is restarted. It is given up if it
-// has ended too often, or kMaxQuickDeaths times in a row soon after its start and for the same
-// reason, since it would then never start.
+// has ended too often within an hour, or kMaxQuickDeaths times in a row soon after its start and
+// for the same reason, since it would then never start.
 
 #include <deque>
 #include <filesystem>
@@ -29,9 +29,23 @@ class QuickDeaths {
   int count_ = 0;
 };
 
+// Counts how often one process ended lately. A rate, because one end a week over months is no
+// reason to give a process up.
+class RecentEnds {
+ public:
+  static constexpr double kWindow_s = 3600;
+
+  // Notes an end; `now_s` must not decrease. Returns the number of ends within the window.
+  int Note(double now_s);
+
+ private:
+  std::deque<double> ends_s_;
+};
+
 class KeptProcesses {
  public:
-  static constexpr int kMaxRestarts = 20;  // per process; then it is given up
+  // per process within RecentEnds::kWindow_s; then it is given up
+  static constexpr int kMaxRestarts = 20;
 
   // `logs`: the folder for the processes' output, <name>.txt.
   explicit KeptProcesses(std::filesystem::path logs);
@@ -46,7 +60,7 @@ class KeptProcesses {
     std::string name;
     std::string why;        // how it ended, for people
     bool given_up = false;  // it is not started again
-    int unexpected = 0;     // number of unintended ends
+    int unexpected = 0;     // number of unintended ends within RecentEnds::kWindow_s
   };
   // Restarts the processes that have ended.
   std::vector<Revived> Revive();
@@ -60,6 +74,7 @@ class KeptProcesses {
     std::vector<std::string> argv;
     std::optional<ChildProcess> child;
     QuickDeaths quick_deaths;
+    RecentEnds recent_ends;
     int unexpected = 0;
     bool expects_end = false;
     bool given_up = false;
