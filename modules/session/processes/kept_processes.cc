@@ -60,6 +60,7 @@ std::vector<KeptProcesses::Revived> KeptProcesses::Revive() {
       continue;
     }
     std::string why = kept.child->HowItEnded();
+    kept.ever_ran |= kept.child->RanSeconds() > QuickDeaths::kAtItsStart_s;
     if (!std::exchange(kept.expects_end, false)) {
       kept.unexpected = kept.recent_ends.Note(1e-6 * static_cast<double>(SteadyMicros()));
       kept.given_up =
@@ -70,7 +71,7 @@ std::vector<KeptProcesses::Revived> KeptProcesses::Revive() {
       StartAgain(&kept, &why);
     }
     if (!waited || !kept.waits) {
-      revived.push_back({kept.child->name(), why, kept.given_up, kept.unexpected});
+      revived.push_back({kept.child->name(), why, kept.given_up, kept.ever_ran, kept.unexpected});
     }
   }
   return revived;

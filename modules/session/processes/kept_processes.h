@@ -60,6 +60,7 @@ class KeptProcesses {
     std::string name;
     std::string why;        // how it ended, for people
     bool given_up = false;  // it is not started again
+    bool ever_ran = false;  // one of its runs was longer than QuickDeaths::kAtItsStart_s
     int unexpected = 0;     // number of unintended ends within RecentEnds::kWindow_s
   };
   // Restarts the processes that have ended.
@@ -77,6 +78,7 @@ class KeptProcesses {
     RecentEnds recent_ends;
     int unexpected = 0;
     bool expects_end = false;
+    bool ever_ran = false;
     bool given_up = false;
     bool waits = false;  // the last attempt to start it again failed
   };

@@ -70,6 +70,7 @@ TEST_F(KeptProcessesTest, OneThatCannotStartIsGivenUpSoon) {
   }
   const KeptProcesses::Revived revived = NextRevived();
   EXPECT_TRUE(revived.given_up);
+  EXPECT_FALSE(revived.ever_ran);
   EXPECT_EQ(revived.why, "exit code 3: no such device");
   EXPECT_EQ(revived.unexpected, QuickDeaths::kMaxQuickDeaths);
   EXPECT_TRUE(kept_.GivenUp("kept_cannot"));

@@ -84,15 +84,20 @@ bool IsServerProcess(const std::string& process) {
   return std::ranges::find(kServerProcesses, process) != std::end(kServerProcesses);
 }
 
-// Restarts ended processes; true if one was given up. The server cannot run without a process,
-// except the gateway.
+// Restarts ended processes; true if one was given up that the server needs. A gateway that has run
+// is not needed: what phones do to it must not end the map. One that cannot start is: somebody has
+// just asked for it, and can mend that.
 bool ReviveAll(KeptProcesses* kept) {
   bool given_up = false;
   for (const KeptProcesses::Revived& revived : kept->Revive()) {
+    const bool needed = revived.name != kGateway || !revived.ever_ran;
+    const std::string end =
+        needed ? "the server ends" : "the server goes on; phones need its next start";
     Say(fmt::format("{} ended ({}); {}", revived.name, revived.why,
-                    revived.given_up ? fmt::format("given up after {} times", revived.unexpected)
-                                     : "starting it again"));
-    given_up |= revived.given_up && revived.name != kGateway;
+                    revived.given_up
+                        ? fmt::format("given up after {} times; {}", revived.unexpected, end)
+                        : "starting it again"));
+    given_up |= revived.given_up && needed;
   }
   return given_up;
 }

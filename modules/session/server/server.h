@@ -26,8 +26,7 @@ struct ServerOptions {
   std::string http;                   // ADDRESS:PORT of the anchors' API; empty: none
   std::vector<std::string> origins;   // web origins that may use it
   std::vector<std::string> names;     // host names of this machine that apps may use
-  // Port of the gateway for phones' browsers, which needs a site; empty: no gateway. If the gateway
-  // cannot start, the server runs without it.
+  // Port of the gateway for phones' browsers, which needs a site; empty: no gateway.
   std::optional<uint16_t> phone_port;
   std::filesystem::path site;
   std::map<std::string, std::filesystem::path> options;  // options file by process
@@ -44,8 +43,9 @@ void AddOptionsFolder(const std::filesystem::path& folder, ServerOptions* option
 std::string ProgramOf(const std::string& process);
 double SteadySeconds();
 
-// Returns the exit code: 0 after a signal, 1 if a process was given up (kept_processes.h). Prints
-// on stdout what it starts. Throws std::runtime_error if it cannot start.
+// Returns the exit code: 0 after a signal, 1 if a process was given up (kept_processes.h), except a
+// gateway that has run. Prints on stdout what it starts. Throws std::runtime_error if it cannot
+// start.
 int Serve(const ServerOptions& options);
 // Runs the verifiers and a bridge for another host's server; uses only bus, logs, options and
 // cluster. Exit code and exceptions as above.
