@@ -52,11 +52,9 @@ void LinkEmulator::Overtake(int64_t at_us) {
     if (--held.overtakers > 0) {
       continue;
     }
-    auto node = queue_.extract(held.place);  // empty if it was already delivered
-    if (!node.empty()) {
-      node.key() = {std::min(held.place.first, at_us), next_order_++};
-      queue_.insert(std::move(node));
-    }
+    auto node = queue_.extract(held.place);
+    node.key() = {std::min(held.place.first, at_us), next_order_++};
+    queue_.insert(std::move(node));
   }
   std::erase_if(held_, [](const Held& held) { return held.overtakers <= 0; });
 }
@@ -94,6 +92,7 @@ std::vector<LinkEmulator::Delivery> LinkEmulator::TakeDue(int64_t now_us) {
     ++counts_.delivered;
     due.push_back({node.key().first, std::move(node.mapped())});
   }
+  std::erase_if(held_, [this](const Held& held) { return !queue_.contains(held.place); });
   return due;
 }
 

@@ -59,6 +59,8 @@ class LinkEmulator {
 
   const Counts& counts() const { return counts_; }
   size_t under_way() const { return queue_.size(); }
+  // Of these, the packets held back that too few others have overtaken yet.
+  size_t held_back() const { return held_.size(); }
 
  private:
   // (delivery time, order of arrival).
@@ -82,7 +84,7 @@ class LinkEmulator {
   const LinkDirection direction_;
   Counts counts_;
   std::map<Place, std::vector<uint8_t>> queue_;
-  std::vector<Held> held_;
+  std::vector<Held> held_;  // each is in queue_
   int64_t queued_bytes_ = 0;
   int64_t next_order_ = 0;
 };

@@ -139,6 +139,15 @@ TEST(LinkEmulator, AHeldPacketThatNobodyFollowsArrives) {
   EXPECT_EQ(emulator.TakeDue(LinkEmulator::kLongestHold_us).size(), 1u);
 }
 
+// If every packet is held back, none overtakes another.
+TEST(LinkEmulator, HeldPacketsAreForgottenWhenTheyArrive) {
+  LinkConditions conditions;
+  conditions.reorder = 1;
+  LinkEmulator emulator(conditions, LinkDirection::kUp);
+  EXPECT_EQ(Send(&emulator, kMany, kMilli).size(), size_t{kMany});
+  EXPECT_EQ(emulator.held_back(), 0u);
+}
+
 TEST(LinkEmulator, DoublesItsShare) {
   LinkConditions conditions;
   conditions.duplicate = 0.05;
