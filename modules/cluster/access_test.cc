@@ -22,27 +22,27 @@ using testing::IsEmpty;
 
 class Access : public testing::Test {
  protected:
+  explicit Access(std::string host = "127.0.0.1", const std::string& folder = "127.0.0.1")
+      : host_(std::move(host)), place_(fmt::format("{}_{}", folder, port_)) {}
   void SetUp() override {
     if (NatsServerProgram().empty()) {
       GTEST_SKIP() << "nats-server is not installed: scripts/setup scripts/packages_cluster.txt";
     }
     fs::remove_all(folder_);
-    const std::string host = fmt::format("127.0.0.1:{}", port_);
     ASSERT_EQ(std::system(fmt::format("{}/packaging/pangea-nats-config --sites hall --hosts {} "
                                       "--out {} > /dev/null",
-                                      PANGEA_SOURCE_DIR, host, folder_.string())
+                                      PANGEA_SOURCE_DIR, Host(), folder_.string())
                               .c_str()),
               0);
-    const fs::path place = folder_ / fmt::format("127.0.0.1_{}", port_);
     server_ = std::make_unique<Program>(std::vector<std::string>{
-        NatsServerProgram(), "-c", place / "nats.conf", "-l", folder_ / "log"});
+        NatsServerProgram(), "-c", folder_ / place_ / "nats.conf", "-l", folder_ / "log"});
     for (int i = 0; i < 100 && !Why(As("core")).empty(); ++i) {
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
     }
   }
+  std::string Host() const { return fmt::format("{}:{}", host_, port_); }
   NatsAccess As(const std::string& role) const {
-    return {fmt::format("tls://127.0.0.1:{}", port_), folder_ / "ca.pem",
-            folder_ / (role + "-hall.credentials")};
+    return {"tls://" + Host(), folder_ / "ca.pem", folder_ / (role + "-hall.credentials")};
   }
   // Why not; empty: connected.
   static std::string Why(const NatsAccess& access) {
@@ -56,6 +56,7 @@ class Access : public testing::Test {
 
   const fs::path folder_ = fs::path(testing::TempDir()) / "cluster_access";
   const int port_ = FreePort();
+  const std::string host_, place_;
   std::unique_ptr<Program> server_;
 };
 
@@ -73,6 +74,16 @@ TEST_F(Access, CoreAndWorkerComeInAndNobodyElse) {
   NatsAccess without_authority = As("worker");
   without_authority.ca.clear();
   EXPECT_THAT(Why(without_authority), HasSubstr("and with it --ca FILE"));
+}
+
+class AccessByIpv6 : public Access {
+ protected:
+  AccessByIpv6() : Access("[::1]", "__1") {}
+};
+
+TEST_F(AccessByIpv6, CoreAndWorkerComeIn) {
+  EXPECT_THAT(Why(As("core")), IsEmpty());
+  EXPECT_THAT(Why(As("worker")), IsEmpty());
 }
 
 TEST_F(Access, AWrongPasswordIsRefused) {
@@ -144,6 +155,16 @@ TEST(NatsConfig, AnAuthorityIsNotReplacedWhenItsKeyIsElsewhere) {
   fs::rename(folder / "elsewhere.key", folder / "ca.key");
   EXPECT_EQ(make("10.0.0.2"), 0);
   EXPECT_EQ(ReadTextFile(folder / "ca.pem"), authority);
+}
+
+TEST(NatsConfig, AnIpv6AddressWithoutBracketsIsRefusedWithTheMend) {
+  const std::string out = testing::TempDir() + "cluster_ipv6.txt";
+  EXPECT_NE(std::system(fmt::format("{}/packaging/pangea-nats-config --sites hall --hosts ::1 "
+                                    "--out {}.folder > {} 2>&1",
+                                    PANGEA_SOURCE_DIR, out, out)
+                            .c_str()),
+            0);
+  EXPECT_THAT(ReadTextFile(out), HasSubstr("an IPv6 address in brackets"));
 }
 
 }  // namespace
