@@ -95,6 +95,10 @@ TEST_F(ReplayOptions, EveryProcessPrintsWhatIsInForce) {
         RunCommand("pangea-" + name + " --print-options --options " + Write(defaults.output));
     EXPECT_EQ(back.output, defaults.output) << name;
   }
+  EXPECT_EQ(RunCommand("pangea-map-points --print-options").output, "# no options\n");
+  EXPECT_EQ(
+      RunCommand("pangea-map-points --print-options --options " + Write("# no options\n")).output,
+      "# no options\n");
   const std::string file = Write("alignment: {min_inliers: 33}\n");
   EXPECT_THAT(RunCommand("pangea-fusion --options " + file + " --print-options").output,
               HasSubstr("  min_inliers: 33  # 4 to 100000: distinct landmarks\n"));

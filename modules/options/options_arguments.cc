@@ -18,7 +18,8 @@ void OptionsArguments::Read(YamlOptions* yaml) const {
 
 bool OptionsArguments::Printed(const YamlOptions& yaml) const {
   if (print_) {
-    std::cout << yaml.Print();
+    const std::string text = yaml.Print();
+    std::cout << (text.find_first_not_of('\n') == std::string::npos ? "# no options\n" : text);
   }
   return print_;
 }
