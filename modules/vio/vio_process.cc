@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <functional>
@@ -275,16 +276,17 @@ void VioProcess::Tick(int64_t now_utime) {
 std::string VioProcess::Summary() const {
   return fmt::format("agent {}: {}{}{}", options_.agent_id, state_text_,
                      doubt_.empty() ? "" : "; " + doubt_,
-                     lag_us_ >= kNotableLag_us ? "; " + LagText() : "");
+                     lag_us_ >= kNotableLag_us ? "; " + LagText(lag_us_) : "");
 }
 
-std::string VioProcess::LagText() const {
-  return fmt::format("lag {:.1f} s, {} images dropped", 1e-6 * static_cast<double>(lag_us_),
+std::string VioProcess::LagText(int64_t lag_us) const {
+  return fmt::format("lag {:.1f} s, {} images dropped", 1e-6 * static_cast<double>(lag_us),
                      num_dropped_);
 }
 
 void VioProcess::NoteLag(int64_t lag_us, int64_t dropped) {
   lag_us_ = lag_us;
+  largest_lag_us_ = std::max(largest_lag_us_, lag_us);
   num_dropped_ += dropped;
   node_.Set("lag_ms", lag_us / 1000);
   node_.Set("images_dropped", num_dropped_);
@@ -292,7 +294,7 @@ void VioProcess::NoteLag(int64_t lag_us, int64_t dropped) {
 }
 
 void VioProcess::TellLag(int64_t now_utime) {
-  const bool behind = num_dropped_ > num_dropped_told_ || lag_us_ > kMaxLag_us;
+  const bool behind = num_dropped_ > num_dropped_told_ || largest_lag_us_ > kMaxLag_us;
   if (!behind || now_utime < next_lag_told_utime_) {
     return;
   }
@@ -301,8 +303,9 @@ void VioProcess::TellLag(int64_t now_utime) {
   std::cerr << fmt::format(
                    "pangea-vio: agent {} cannot keep up: {} of {}; fewer or smaller images, or a "
                    "quicker machine\n",
-                   options_.agent_id, LagText(), num_images_ + num_dropped_)
+                   options_.agent_id, LagText(largest_lag_us_), num_images_ + num_dropped_)
             << std::flush;
+  largest_lag_us_ = 0;
 }
 
 void VioProcess::OnCorrection(const Correction& correction) {

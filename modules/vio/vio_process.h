@@ -100,7 +100,7 @@ class VioProcess : public Process {
   void OpenTum(const std::string& file);
   void NoteTumFailure();
   std::string Summary() const;
-  std::string LagText() const;
+  std::string LagText(int64_t lag_us) const;
   void TellLag(int64_t now_utime);
 
   VioProcessOptions options_;
@@ -120,7 +120,8 @@ class VioProcess : public Process {
   int64_t num_poses_ = 0;
   int64_t num_keyframes_ = 0;
   int64_t lag_us_ = 0;
-  int64_t num_dropped_ = 0;  // because of the lag
+  int64_t largest_lag_us_ = 0;  // since the last message on stderr
+  int64_t num_dropped_ = 0;     // because of the lag
   int64_t num_dropped_told_ = 0;
   int64_t next_lag_told_utime_ = 0;
   std::ofstream tum_;

@@ -163,7 +163,7 @@ TEST_F(VioLiveTest, ALiveOdometryThatCannotKeepUpDropsImagesAndSaysSo) {
   bus.Drain();
   const std::string dropped = std::to_string(Counter("images_dropped"));
   EXPECT_EQ(::testing::internal::GetCapturedStderr(),
-            "pangea-vio: agent 7 cannot keep up: lag 1.0 s, " + dropped + " images dropped of " +
+            "pangea-vio: agent 7 cannot keep up: lag 1.1 s, " + dropped + " images dropped of " +
                 std::to_string(poses.size() + std::stoul(dropped)) +
                 "; fewer or smaller images, or a quicker machine\n");
   EXPECT_EQ(Counter("lag_ms"), 1000);
@@ -179,6 +179,24 @@ TEST_F(VioLiveTest, ALiveOdometryThatCannotKeepUpDropsImagesAndSaysSo) {
   bus.Drain();
   EXPECT_EQ(poses.back().utime, (kImages - 1) * kImageStep_us);
   EXPECT_EQ(status_.summary.find("lag"), std::string::npos) << status_.summary;
+}
+
+TEST_F(VioLiveTest, ImagesWithoutInertialSamplesAreNotCalledASlowMachine) {
+  VioProcess process(bus_, options_, 0);
+  LiveInput live(process, 7, ImuNoise{});
+  PublishMessage(bus_, "CAMERA_7", ToMessage(world_.camera()));
+  const cv::Mat image = RandomTexture(752, 480, 3);
+  PublishImu(0);
+  for (const int64_t utime : {100'000, 200'000, 1'150'000, 2'100'000}) {
+    PublishImage(utime, image);
+  }
+  bus_.Drain();
+  ::testing::internal::CaptureStderr();
+  process.Tick(1);
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
+  bus_.Drain();
+  EXPECT_EQ(Refused("image: its inertial samples have not come within a second"), 2);
+  EXPECT_EQ(status_.dropped, 0);
 }
 
 TEST_F(VioLiveTest, OneStampFarAheadDoesNotBlockTheLiveStream) {

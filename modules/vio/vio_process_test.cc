@@ -298,6 +298,12 @@ TEST_F(VioProcessTest, ALostOdometryOpensANewMap) {
                   "agent 7: [0-9]+ of [0-9]+ images have a pose; {} keyframes in 2 maps",
                   keyframes_.size())));
   process.NoteLag(2'000'000, 5);
+  process.NoteLag(20'000, 0);
+  ::testing::internal::CaptureStderr();
+  process.Tick(1);
+  EXPECT_THAT(::testing::internal::GetCapturedStderr(),
+              ::testing::HasSubstr("cannot keep up: lag 2.0 s, 5 images dropped"))
+      << "the lag is over";
   EXPECT_THAT(process.Totals(), ::testing::EndsWith("; 5 more images were dropped, as this machine "
                                                     "is too slow for real time"));
   int32_t expected = 0;

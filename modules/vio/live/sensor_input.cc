@@ -57,15 +57,21 @@ void SensorInput::AddImage(int64_t utime, const cv::Mat& image) {
   Deliver();
 }
 
-// Drops the oldest images until the lag is within its limit.
+// Drops the oldest images until the lag is within its limit. The odometry is too slow only for
+// those whose samples have come.
 void SensorInput::DropStale() {
+  const int64_t lag_us = Lag();
   int64_t dropped = 0;
   while (images_.size() > kMaxImages || Lag() > VioProcess::kMaxLag_us) {
+    if (Ready()) {
+      ++dropped;
+    } else {
+      process_.node().Refuse("image: its inertial samples have not come within a second");
+    }
     images_.pop_front();
-    ++dropped;
   }
   if (dropped > 0) {
-    process_.NoteLag(Lag(), dropped);
+    process_.NoteLag(lag_us, dropped);
   }
 }
 
