@@ -221,7 +221,7 @@ TEST(Eval, TheEstimateComesFirst) {
 }
 
 // No server answers on this link.
-TEST(Uplink, SaysWhatIsLostWithoutASpool) {
+TEST(Uplink, SaysAtItsEndWhatIsLostWithoutASpool) {
   const Outcome outcome = RunCommand(
       "(rm -rf lost && mkdir -m 700 lost && pangea-agent-handler keygen --agent 1 --out lost/key "
       "&& "
@@ -230,7 +230,7 @@ TEST(Uplink, SaysWhatIsLostWithoutASpool) {
       "pangea-keyframe-player --agent 1 --bus 'udpm://239.255.76.67:20013' "
       "--keyframes " PANGEA_SOURCE_DIR "/logs/two_walks/session.lcm --rate 20; wait)");
   EXPECT_THAT(outcome.output,
-              HasSubstr("32 keyframes were not acknowledged and are lost: --spool FOLDER"));
+              HasSubstr("keyframes: 0 acknowledged, 32 lost: --spool FOLDER keeps them"));
 }
 
 }  // namespace

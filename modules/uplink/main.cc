@@ -59,11 +59,7 @@ int Run(const Arguments& a, const UplinkOptions& options, const std::string& opt
   const std::string name = fmt::format("uplink_{}", a.agent_id);
   OptionsAnnouncer announcer(agent_bus, name, told_options);
   const int exit_code = RunPolledProcess(agent_bus, link_bus, process, announcer);
-  if (!spool && process.num_waiting() > 0) {
-    Log(name, fmt::format("ended; {} keyframes were not acknowledged and are lost: --spool FOLDER "
-                          "keeps them for the next start",
-                          process.num_waiting()));
-  }
+  Log(name, "ended; " + process.Totals());
   return exit_code;
 }
 

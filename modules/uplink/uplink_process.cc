@@ -294,6 +294,17 @@ void UplinkProcess::PublishCorrections() {
   }
 }
 
+std::string UplinkProcess::Totals() const {
+  std::string text = fmt::format("{:.1f} kB sent; keyframes: {} acknowledged",
+                                 1e-3 * static_cast<double>(bytes_up_), uplink_.keyframes_acked());
+  if (num_waiting() > 0) {
+    text += fmt::format(", {} {}", num_waiting(),
+                        spool_ != nullptr ? "in the spool for the next start"
+                                          : "lost: --spool FOLDER keeps them for the next start");
+  }
+  return text;
+}
+
 // Must be called once per second, because it also computes the rate.
 std::string UplinkProcess::RateForPeople() {
   constexpr double kSmoothing = 0.1;

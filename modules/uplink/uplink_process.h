@@ -27,10 +27,12 @@ class UplinkProcess : public PolledProcess {
 
   int Poll(int64_t steady_us) override;
   void Tick(int64_t now_utime) override;
-  // Number of keyframes that the server has not acknowledged yet.
-  int64_t num_waiting() const { return static_cast<int64_t>(uplink_.sender().spooled()); }
+  // A summary of what was sent, acknowledged and is left, for people.
+  std::string Totals() const;
 
  private:
+  // Number of keyframes that the server has not acknowledged yet.
+  int64_t num_waiting() const { return static_cast<int64_t>(uplink_.sender().spooled()); }
   void OnKeyframe(Bytes data);
   void OnPose(Bytes data);
   void OnLinkDown(Bytes data);

@@ -3,11 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <string>
 
 #include "bus/bus.h"
 #include "bus/node.h"
 #include "messages/channels.h"
+#include "messages/testing/test_keyframes.h"
 #include "pangea/status_t.hpp"
 
 namespace pangea {
@@ -39,6 +41,23 @@ std::string RefusedBeside(const std::string& process) {
 TEST(UplinkProcess, AServerOnTheAgentsBusIsNamed) {
   EXPECT_NE(RefusedBeside("agent_handler").find("--bus"), std::string::npos);
   EXPECT_EQ(RefusedBeside("vio_1"), "");
+}
+
+TEST(UplinkProcess, TellsWhatWasSentAndWhatIsLeft) {
+  LocalBus agent_bus, link_bus;
+  const std::string folder = testing::TempDir() + "uplink_totals";
+  std::filesystem::remove_all(folder);
+  Spool spool(folder, 1, 1'000'000);
+  UplinkProcess kept(agent_bus, link_bus, 1, SecretKey::Random(), UplinkOptions{}, &spool);
+  UplinkProcess lost(agent_bus, link_bus, 1, SecretKey::Random(), UplinkOptions{});
+  EXPECT_EQ(kept.Totals(), "0.0 kB sent; keyframes: 0 acknowledged");
+  agent_bus.Publish(channels::Keyframe(1), EncodeTestKeyframe({{1, 5}, 0}));
+  agent_bus.Drain();
+  EXPECT_EQ(kept.Totals(),
+            "0.0 kB sent; keyframes: 0 acknowledged, 1 in the spool for the next start");
+  EXPECT_EQ(lost.Totals(),
+            "0.0 kB sent; keyframes: 0 acknowledged, 1 lost: --spool FOLDER keeps them for the "
+            "next start");
 }
 
 }  // namespace
