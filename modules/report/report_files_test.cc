@@ -182,6 +182,8 @@ TEST_F(ReportFilesTest, ProcessesAndRestartsAreReported) {
   EXPECT_EQ(report["processes"]["fusion"]["realtime_factor"], 3.5);
   EXPECT_EQ(report["processes"]["posegraph"]["restarts"], 1);
   EXPECT_THAT(report["notes"], Contains("posegraph died and was restarted"));
+  EXPECT_THAT(markdown_, HasSubstr("Realtime: seconds of session per second of the process' CPU"));
+  EXPECT_THAT(Text("report.html"), HasSubstr("median, p99: handling time of the newest 1000"));
 }
 
 TEST_F(ReportFilesTest, ThePointCloudIsColouredByAgentAndHasEachLandmarkOnce) {

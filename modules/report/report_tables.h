@@ -29,6 +29,11 @@ inline constexpr const char* kAnchorsExplained =
     "step in the agent's odom frame from one image to the next.";
 inline constexpr const char* kNeesExplained =
     "NEES: squared error / covariance, per dimension; 1 when the covariance is honest.";
+inline constexpr const char* kProcessesExplained =
+    "Realtime: seconds of session per second of the process' CPU time. In, out, dropped: messages; "
+    "median, p99: handling time of the newest 1000; MB: memory. Counts and CPU time are those "
+    "since "
+    "its last start.";
 
 // One line for each fusion or split of a group.
 std::vector<std::string> ChangeLines(const CapturedSession& session, const ReportMetrics& metrics);

@@ -50,7 +50,7 @@ std::string ReportMarkdown(const ReportInput& input, const CapturedSession& sess
     }
   }
   if (const Table processes = ProcessTable(input, session); !processes.empty()) {
-    text += fmt::format("\n## Processes\n\n{}", processes.Text());
+    text += fmt::format("\n## Processes\n\n{}\n{}\n", processes.Text(), kProcessesExplained);
   }
   if (!metrics.notes.empty()) {
     text += fmt::format("\n## Notes\n\n- {}\n", fmt::join(metrics.notes, "\n- "));

@@ -175,6 +175,12 @@ std::string Constraints(const CapturedSession& session, const ReportMetrics& met
   return html;
 }
 
+std::string Processes(const ReportInput& input, const CapturedSession& session) {
+  const Table processes = ProcessTable(input, session);
+  return processes.empty() ? Paragraph("No process was captured.")
+                           : processes.Html() + Aside(kProcessesExplained);
+}
+
 std::string Traffic(const CapturedSession& session, const ReportMetrics& metrics) {
   std::string html = ChartOr(TrafficChart(session, metrics), "kB per second on the link",
                              "Not measured second by second: there is no link in a replay, and in "
@@ -241,7 +247,7 @@ std::string ReportHtml(const ReportInput& input, const CapturedSession& session,
   html += Section("load", "Load",
                   ChartOr(LoadChart(session, metrics), "CPU of each process over the session",
                           "No process said anything: a replay has none.") +
-                      TableOr(ProcessTable(input, session), "No process was captured."));
+                      Processes(input, session));
   html += Section("traffic", "Traffic", Traffic(session, metrics));
   html += Section("paper", "Beside the paper", Paper(metrics));
   html +=
