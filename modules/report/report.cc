@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "files/text_file.h"
+#include "report/earlier_report.h"
 #include "report/html/report_html.h"
 #include "report/report_anchor_pictures.h"
 #include "report/report_json.h"
@@ -45,6 +46,7 @@ WrittenReport WriteReport(const ReportInput& input, const std::string& folder,
                           LogReadings* readings) {
   const CapturedSession session = ReadServerLog(input.server_log, readings);
   ReportMetrics metrics = ComputeMetrics(input, session, readings);
+  RemoveEarlierReport(folder);
   for (const AgentMetrics& agent : metrics.agents) {
     WriteTrajectories(agent, metrics.groups, folder);
   }

@@ -3,7 +3,7 @@
 // Makes the output directory from captured logs: trajectories, map, metrics, pictures. The same
 // after a live run and after a replay; the same input gives the same bytes.
 //
-// Writes into `folder` (which must exist):
+// Writes into `folder` (which must exist), in place of an earlier report's files:
 //   agent_<id>.vio.tum       T_odom_body of the agent's main map, raw odometry at camera rate
 //                            (of its other maps: agent_<id>.<map>.vio.tum)
 //   agent_<id>.tum           T_map_body of its keyframes in the map frame of its main group: the

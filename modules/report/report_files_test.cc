@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string>
@@ -197,6 +198,41 @@ TEST_F(ReportFilesTest, ThePointCloudIsColouredByAgentAndHasEachLandmarkOnce) {
   const Eigen::Vector3d p = OdomFromTruth(1) * Truth(1, Seconds(0)) * Eigen::Vector3d(0, 0, 2);
   EXPECT_THAT(ply, HasSubstr(fmt::format("{:.4f} {:.4f} {:.4f} 0 114 178\n", p.x(), p.y(), p.z())));
   EXPECT_THAT(ply, HasSubstr(" 213 94 0\n"));
+}
+
+TEST_F(ReportFilesTest, AnEarlierReportLeavesNoFilesAndAPersonsFilesStay) {
+  LogBoth();
+  Report();  // two groups of one map
+  const std::string others = "." + Underscored(Map(2));
+  for (const std::string& file : {"map" + others + ".ply", std::string("agent_2.tum")}) {
+    EXPECT_TRUE(Exists(file)) << file;
+  }
+  for (const std::string file : {"agent_3.tum", "notes.md", "map.mine.ply"}) {
+    std::ofstream(folder_ + "/out/" + file) << "mine";
+  }
+  input_.server_log = folder_ + "/second.lcm";
+  log_ = std::make_unique<LogWriter>(input_.server_log);
+  LogKeyframes(Map(1), 0, NumKeyframes());
+  input_.agents.resize(1);
+  Report();
+  for (const std::string& file : {"map" + others + ".ply", "trajectory" + others + ".png",
+                                 std::string("agent_2.tum"), std::string("agent_2.vio.tum")}) {
+    EXPECT_FALSE(Exists(file)) << file;
+  }
+  for (const std::string file : {"agent_3.tum", "notes.md", "map.mine.ply"}) {
+    EXPECT_EQ(Text(file), "mine");
+  }
+}
+
+TEST_F(ReportFilesTest, AForeignReportJsonRemovesNothing) {
+  std::ofstream(folder_ + "/precious.ply") << "mine";
+  std::ofstream(folder_ + "/out/map.1_x.ply") << "mine";
+  std::ofstream(folder_ + "/out/report.json")
+      << R"({"agents": [{"id": 1, "map_ids": ["1/x", "1/../../precious"]}]})";
+  LogBoth();
+  Report();
+  EXPECT_EQ(Text("map.1_x.ply"), "mine");
+  EXPECT_EQ(Text("../precious.ply"), "mine");
 }
 
 TEST_F(ReportFilesTest, AnEmptyLogStillGivesAReport) {
