@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
-"""Tests the conversions of examples/anchors to the frames of Unity, three.js and WebXR, evaluated from its text: points transform alike."""
+"""Tests examples/anchors: its conversions to the frames of Unity, three.js and WebXR, evaluated from its text, and which anchors it draws."""
 
 import ast
 import math
 import random
 import re
+import shutil
+import subprocess
 import unittest
 from pathlib import Path
 
@@ -66,6 +68,35 @@ class Frames(unittest.TestCase):
         for convert, axes in there.items():
             for name, axis in axes.items():
                 self.assertEqual(tuple(convert(ours[name], (1, 0, 0, 0))[0]), axis, name)
+
+
+SOCKET = """
+const drawn = new Set();
+let socket;
+globalThis.WebSocket = class { constructor() { socket = this; } };
+const object = ({name}) => ({position: {set() {}}, quaternion: {set() {}}, name, removeFromParent() { drawn.delete(name); }});
+const showGroup = listen("", {add: (object) => drawn.add(object.name)}, object);
+const tell = (id, group, type = "anchor") =>
+  socket.onmessage({data: JSON.stringify({type, id, name: id, ...(type === "gone" ? {} : {group, pose: {position: [1, 2, 3], orientation: [1, 0, 0, 0]}})})});
+const say = () => console.log([...drawn].sort().join(" "));
+"""
+
+
+@unittest.skipUnless(shutil.which("node"), "needs node")
+class Groups(unittest.TestCase):
+    """Each group has a map frame of its own, so only one's own group is drawn."""
+
+    def drawn(self, script):
+        code = (FOLDER / "three.js").read_text() + SOCKET + script
+        return subprocess.run(["node", "-e", code], capture_output=True, text=True, check=True).stdout.split("\n")[:-1]
+
+    def test_three_draws_the_own_group(self):
+        self.assertEqual(self.drawn("""
+            tell("a", "1/5"); tell("b", "2/6"); say();
+            showGroup("2/6"); say();
+            tell("c", "2/6"); say();
+            showGroup("1/5"); tell("c", "1/5"); say();
+            tell("a", "", "gone"); showGroup("1/5"); say();"""), ["", "b", "b c", "a c", "c"])
 
 
 if __name__ == "__main__":

@@ -7,12 +7,13 @@ function place(object, pose) {
   object.quaternion.set(-qy, qz, -qx, qw);
 }
 
-function listen(url, map, makeObject) {  // map: the Object3D that stands for our frame
-  const shown = new Map();
-  const socket = new WebSocket(url);     // 'ws://127.0.0.1:8090/v1/events', with --allow-origin for this page
-  socket.onmessage = ({data}) => {
-    const anchor = JSON.parse(data);
-    if (anchor.type === 'gone' || !anchor.pose) {
+// Draws the anchors of one group, because each group has a map frame of its own. Call the returned function with the group of one's agent
+// (`group` in /v1/agents), at first and when it changes. `map`: the Object3D that stands for our frame.
+function listen(url, map, makeObject) {
+  const known = new Map(), shown = new Map();
+  let ownGroup;
+  function draw(anchor) {
+    if (!anchor.pose || anchor.group !== ownGroup) {
       shown.get(anchor.id)?.removeFromParent();
       shown.delete(anchor.id);
       return;
@@ -22,6 +23,16 @@ function listen(url, map, makeObject) {  // map: the Object3D that stands for ou
       map.add(shown.get(anchor.id));
     }
     place(shown.get(anchor.id), anchor.pose);
+  }
+  const socket = new WebSocket(url);  // 'ws://127.0.0.1:8090/v1/events', with --allow-origin for this page
+  socket.onmessage = ({data}) => {
+    const anchor = JSON.parse(data);  // of type 'gone': without a pose
+    known.set(anchor.id, anchor);
+    draw(anchor);
+  };
+  return (group) => {
+    ownGroup = group;
+    known.forEach(draw);
   };
 }
 
