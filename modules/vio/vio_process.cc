@@ -284,6 +284,13 @@ std::string VioProcess::LagText(int64_t lag_us) const {
                      num_dropped_);
 }
 
+void VioProcess::RefuseImage(const std::string& why) {
+  node_.Refuse("image: " + why);
+  if (num_images_ == 0) {
+    state_text_ = "waiting for images that can be used; the last one: " + why;
+  }
+}
+
 void VioProcess::NoteLag(int64_t lag_us, int64_t dropped) {
   lag_us_ = lag_us;
   largest_lag_us_ = std::max(largest_lag_us_, lag_us);

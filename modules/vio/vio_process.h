@@ -64,6 +64,8 @@ class VioProcess : public Process {
   // Like Vio::AddImage and Vio::AddTracks.
   void AddImage(int64_t utime, const cv::Mat& image, std::span<const ImuSample> imu);
   void AddTracks(const TrackedFrame& frame, const cv::Mat& image, std::span<const ImuSample> imu);
+  // Counts an image that cannot be used. Until one can, the status says why none is.
+  void RefuseImage(const std::string& why);
   // Reports how far the odometry is behind its sensors, and how many images were dropped for this
   // since the last call. Published in the status, and printed on stderr if the odometry cannot keep
   // up.

@@ -181,6 +181,26 @@ TEST_F(VioLiveTest, ALiveOdometryThatCannotKeepUpDropsImagesAndSaysSo) {
   EXPECT_EQ(status_.summary.find("lag"), std::string::npos) << status_.summary;
 }
 
+TEST_F(VioLiveTest, ImagesOfAnotherSizeAreNamedInTheStatus) {
+  VioProcess process(bus_, options_, 0);
+  LiveInput live(process, 7, ImuNoise{});
+  auto summary = [&, utime = int64_t{0}]() mutable {
+    bus_.Drain();
+    process.Tick(utime += 1'000'000);
+    bus_.Drain();
+    return status_.summary;
+  };
+  PublishImage(50'000, RandomTexture(640, 480, 3));
+  EXPECT_NE(summary().find("the last one: no CAMERA yet"), std::string::npos) << status_.summary;
+  PublishMessage(bus_, "CAMERA_7", ToMessage(world_.camera()));
+  PublishImage(100'000, RandomTexture(640, 480, 3));
+  EXPECT_EQ(summary(),
+            "agent 7: waiting for images that can be used; the last one: 640x480 pixels instead of "
+            "752x480, as CAMERA says");
+  PlayLive(200'000, 400'000, RandomTexture(752, 480, 3));
+  EXPECT_EQ(summary().find("waiting"), std::string::npos) << status_.summary;
+}
+
 TEST_F(VioLiveTest, ImagesWithoutInertialSamplesAreNotCalledASlowMachine) {
   VioProcess process(bus_, options_, 0);
   LiveInput live(process, 7, ImuNoise{});

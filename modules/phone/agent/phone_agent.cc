@@ -78,11 +78,24 @@ void PhoneAgent::Listen() {
 void PhoneAgent::AddImage(int64_t utime, const cv::Mat& image,
                           const std::optional<Rigid3>& T_odom_body) {
   if (image.type() != CV_8U || image.size() != image_size_) {
-    odometry_->node().Refuse("image: its size is not the calibration's");
+    RefuseImage(utime, image.size());
   } else {
     odometry_->AddImage(utime, image, T_odom_body);
   }
   agent_bus_.Drain();
+}
+
+// A pose with the reason, because the page shows nothing else of the agent to the visitor.
+void PhoneAgent::RefuseImage(int64_t utime, const cv::Size& size) {
+  const std::string why = fmt::format("{}x{} pixels, but the calibration is of {}x{}", size.width,
+                                      size.height, image_size_.width, image_size_.height);
+  odometry_->node().Refuse("image: " + why);
+  PhonePose pose;
+  pose.utime = utime;
+  pose.state = pose_t::STATE_INITIALISING;
+  pose.reason = why;
+  pose.map = map_;
+  events_.pose = std::move(pose);
 }
 
 void PhoneAgent::OnLinkDown(Bytes packet) {

@@ -112,6 +112,7 @@ class PhoneAgent {
   static constexpr size_t kMaxTrackedMaps = 16;
 
   void Listen();
+  void RefuseImage(int64_t utime, const cv::Size& size);
   void OnKeyframe(Bytes data);
   void OnPose(const pose_t& message);
   void NoteTracked(int64_t utime, const MapId& map);

@@ -292,11 +292,15 @@ TEST_F(PhoneAgentWithDevicePosesTest, AnAnchorIsPlacedInTheMapOfItsImage) {
   EXPECT_EQ(placed->map, (MapId{7, kStart_us + 1}));
 }
 
-TEST_F(PhoneAgentTest, AnImageOfAnotherSizeIsRefusedAndCounted) {
+TEST_F(PhoneAgentTest, AnImageOfAnotherSizeIsRefusedAndCountedAndThePoseSaysWhy) {
   agent_.AddImage(1'000, cv::Mat(10, 10, CV_8U, cv::Scalar(0)));
   Run(2);
   ASSERT_TRUE(vio_status_);
-  EXPECT_EQ(Refused(*vio_status_, "image: its size is not the calibration's"), 1);
+  const std::string why = "10x10 pixels, but the calibration is of 64x48";
+  EXPECT_EQ(Refused(*vio_status_, "image: " + why), 1);
+  ASSERT_TRUE(pose_);
+  EXPECT_EQ(pose_->state, pose_t::STATE_INITIALISING);
+  EXPECT_EQ(pose_->reason, why);
 }
 
 TEST_F(PhoneAgentTest, AnAnchorNeedsAPose) {

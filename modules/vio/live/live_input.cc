@@ -1,5 +1,7 @@
 #include "vio/live/live_input.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstring>
 #include <span>
@@ -64,18 +66,24 @@ void LiveInput::OnImu(const imu_t& message) {
   sensors_.AddImu(sample);
 }
 
-bool LiveInput::Plausible(const image_t& message) const {
-  return camera_ && message.width == camera_->width && message.height == camera_->height &&
-         message.num_chunks > 0 && message.chunk >= 0 && message.chunk < message.num_chunks &&
+bool LiveInput::Plausible(const image_t& message) {
+  return message.num_chunks > 0 && message.chunk >= 0 && message.chunk < message.num_chunks &&
          message.total_bytes > 0 && message.total_bytes <= kMaxImageBytes &&
          message.num_bytes >= 0 && message.offset_bytes >= 0 &&
          message.offset_bytes <= message.total_bytes - message.num_bytes;
 }
 
 void LiveInput::OnImage(const image_t& message) {
+  if (!camera_) {
+    return process_.RefuseImage("no CAMERA yet");
+  }
+  if (message.width != camera_->width || message.height != camera_->height) {
+    return process_.RefuseImage(fmt::format("{}x{} pixels instead of {}x{}, as CAMERA says",
+                                            message.width, message.height, camera_->width,
+                                            camera_->height));
+  }
   if (!Plausible(message)) {
-    process_.node().Refuse(camera_ ? "image: size or chunk does not fit" : "image: no CAMERA yet");
-    return;
+    return process_.RefuseImage("chunk does not fit");
   }
   const std::optional<int64_t> newest = sensors_.newest_image();
   if (newest && message.utime <= *newest &&
@@ -132,8 +140,7 @@ void LiveInput::Complete(int64_t utime) {
       std::erase_if(assemblies_, [utime](const Assembly& other) { return other.utime < utime; })));
   const GreyImage image = Decode(complete.encoding, complete.bytes, *camera_);
   if (image.pixels.empty()) {
-    process_.node().Refuse("image: " + image.why);
-    return;
+    return process_.RefuseImage(image.why);
   }
   sensors_.AddImage(utime, image.pixels);
 }

@@ -40,7 +40,7 @@ class LiveInput {
   void OnCamera(const camera_t& message);
   void OnImu(const imu_t& message);
   void OnImage(const image_t& message);
-  bool Plausible(const image_t& message) const;
+  static bool Plausible(const image_t& message);
   Assembly& AssemblyOf(const image_t& message);
   void Complete(int64_t utime);
 

@@ -14,6 +14,8 @@ test("what to do comes before what is good", () => {
   assert.match(says({ motionSilent: true }), /no motion/);
   assert.match(says({ pose: undefined }), /Starting/);
   assert.match(says({ pose: { ...pose, state: "initialising", reason: "not enough motion yet: velocity" } }), /Move sideways/);
+  const otherSize = "1280x720 pixels, but the calibration is of 640x480";
+  assert.match(says({ pose: { ...pose, state: "initialising", reason: otherSize } }), /calibrate the camera again/);
   const blank = { ...pose, state: "initialising", reason: "too few features are tracked from image to image" } as const;
   assert.match(says({ pose: blank }), /more detail/);
   assert.match(says({ pose: { ...blank }, brightness: 10 }), /Too dark/);

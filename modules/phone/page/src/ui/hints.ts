@@ -60,6 +60,7 @@ const kMoves: Record<CalibrationProgress["missing"], string> = {
 };
 
 function starting(reason: string): Hint {
+  if (/the calibration is of/.test(reason)) return { text: "Another camera or image size than the calibration's: calibrate the camera again.", tone: "bad" };
   if (/too few features/.test(reason)) return { text: "Look at something with more detail.", tone: "do" };
   if (/accelerometer shows/.test(reason)) return { text: "Hold the phone more quietly for a moment.", tone: "do" };
   return { text: "Move sideways, slowly.", tone: "do" };
