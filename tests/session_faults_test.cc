@@ -41,6 +41,26 @@ TEST(SessionFaults, ACutOffAgentAndAKilledProcessCostNothing) {
   fs::remove_all(folder);
 }
 
+// At rate max there is no session time after the last recording.
+TEST(SessionFaults, AFaultAfterTheRecordingsDoesNotHappenAtRateMax) {
+  const fs::path folder = FreshFolder("session_late_fault");
+  const std::string keyframes = "keyframes: " PANGEA_SOURCE_DIR "/logs/two_walks/session.lcm";
+  const fs::path file = WriteSession(folder, {"id: 1, " + keyframes});
+  std::ofstream(file, std::ios::app) << "faults:\n  - {at: 2, kill: fusion}\n"
+                                        "  - {at: 500, kill: posegraph}\n";
+  const fs::path out = folder / "out";
+  const Outcome run =
+      RunCommand("pangea-session run " + file.string() + " --out " + out.string() + " --rate max");
+  EXPECT_EQ(run.exit_code, 0) << run.output;
+  const std::string said = "the fault 'kill posegraph at 500 s' did not happen";
+  EXPECT_THAT(run.output, HasSubstr(said));
+  const auto report = ReadJson(out / "report.json");
+  EXPECT_EQ(report["processes"]["fusion"]["restarts"], 1);
+  EXPECT_FALSE(report["processes"]["posegraph"].contains("restarts"));
+  EXPECT_THAT(report["notes"], testing::Contains(HasSubstr(said)));
+  fs::remove_all(folder);
+}
+
 // As on a full disk: no file grows beyond 300 kB. The server can never write the rest.
 TEST(SessionFaults, AFullDiskIsSaidAndCtrlCEndsTheWaiting) {
   const fs::path folder = FreshFolder("session_full_disk");

@@ -143,6 +143,7 @@ ReportOutcome ReportRun(const SessionScript& script, const RunSummary& summary, 
     ++input.restarts[name];
   }
   input.notes = summary.failures;
+  input.notes.insert(input.notes.end(), summary.notes.begin(), summary.notes.end());
   input.anchors = WantedAnchors(script);
   input.expect = script.expect;
   NoteOptions(input.server_log, readings, &input);

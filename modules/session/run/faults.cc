@@ -1,5 +1,6 @@
 #include "session/run/faults.h"
 
+#include <fmt/format.h>
 #include <sys/resource.h>
 
 #include <algorithm>
@@ -38,6 +39,19 @@ std::set<std::string> FaultSchedule::DisksEverFull() const {
   }
   full.erase("");
   return full;
+}
+
+std::vector<std::string> FaultSchedule::NotReached() const {
+  std::vector<std::string> left;
+  for (size_t i = next_; i < faults_.size(); ++i) {
+    const Fault& fault = faults_[i];
+    if (!fault.kill.empty() || !fault.disk_full.empty()) {
+      left.push_back(fault.kill.empty()
+                         ? fmt::format("disk_full {} at {:g} s", fault.disk_full, fault.at_s)
+                         : fmt::format("kill {} at {:g} s", fault.kill, fault.at_s));
+    }
+  }
+  return left;
 }
 
 double FaultSchedule::end_s() const {

@@ -39,6 +39,8 @@ class FaultSchedule {
   std::set<std::string> DisksFull(double session_s) const;
   // All processes whose disk is full at some time.
   std::set<std::string> DisksEverFull() const;
+  // What has not come by the time of the last TakeKills, for people: "kill fusion at 12.5 s".
+  std::vector<std::string> NotReached() const;
   // Session time of the end of the last fault; 0 without faults.
   double end_s() const;
 

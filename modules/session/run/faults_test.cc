@@ -21,6 +21,14 @@ TEST(FaultSchedule, KillsEachOnceInTheOrderOfTime) {
   EXPECT_EQ(faults.end_s(), 8);
 }
 
+TEST(FaultSchedule, WhatTheSessionDidNotReachIsNamed) {
+  FaultSchedule faults({{7, "fusion", "", 0}, {2, "uplink_1", "", 0}, {9.5, "", "fusion", 5}});
+  faults.TakeKills(2);
+  EXPECT_THAT(faults.NotReached(), ElementsAre("kill fusion at 7 s", "disk_full fusion at 9.5 s"));
+  faults.TakeKills(10);
+  EXPECT_THAT(faults.NotReached(), ElementsAre());
+}
+
 TEST(FaultSchedule, ADiskIsFullForItsTime) {
   const FaultSchedule faults({{3, "", "agent_handler", 5}, {4, "fusion", "", 10}});
   EXPECT_THAT(faults.DisksFull(2.9), ElementsAre());

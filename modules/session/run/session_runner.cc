@@ -67,6 +67,11 @@ class Runner {
     Play();
     Drain();
     progress_.Finish();
+    for (const std::string& fault : faults_.NotReached()) {
+      summary_.notes.push_back(
+          fmt::format("the fault '{}' did not happen: the session ended before", fault));
+      progress_.PrintLine(summary_.notes.back());
+    }
     std::ranges::copy(anchors_.NotPlaced(), std::back_inserter(summary_.failures));
     kept_.StopAll(kStopGrace_s);
     summary_.wall_s = Now() - begin_;
@@ -216,16 +221,20 @@ class Runner {
       return (Now() - play_begin_) * std::stod(options_.rate);
     }
     double furthest = 0;
-    bool any_playing = false;
     for (const Player& player : players_) {
       if (player.child) {
         furthest = std::max(furthest,
                             player.script.delay_s + monitor_.agent(player.script.id).recorded_s());
-        any_playing = any_playing || !player.done();
       }
     }
-    // If no agent plays, session time would stop: the next agent starts at once.
-    return any_playing ? furthest : 1e18;
+    return furthest;
+  }
+
+  // At rate max session time stops while no agent plays.
+  bool SessionTimeStops() const {
+    return options_.rate == "max" && std::ranges::none_of(players_, [](const Player& player) {
+             return player.child && !player.done();
+           });
   }
 
   void Play() {
@@ -238,7 +247,8 @@ class Runner {
     while ((!std::all_of(players_.begin(), players_.end(), done) || faults_to_come()) &&
            !StopRequested()) {
       for (Player& player : players_) {
-        const bool due = player.script.delay_s <= 0 || SessionTime() >= player.script.delay_s;
+        const bool due = player.script.delay_s <= 0 || SessionTime() >= player.script.delay_s ||
+                         SessionTimeStops();
         if (!player.child && due) {
           StartPlayer(player);
         }
@@ -331,7 +341,10 @@ class Runner {
       }
       kept_.ExpectEnd(name);
     }
-    const std::set<std::string> full = faults_.DisksFull(SessionTime());
+    std::set<std::string> full;
+    if (!SessionTimeStops()) {
+      full = faults_.DisksFull(SessionTime());
+    }
     for (const std::string& name : faults_.DisksEverFull()) {
       if (ChildProcess* child = Find(name)) {
         SetDiskFull(child->pid(), full.contains(name));

@@ -26,6 +26,7 @@ struct RunSummary {
   double wall_s = 0;
   std::vector<std::string> restarted;      // names, once for each restart
   std::vector<std::string> failures;       // one line for each failure
+  std::vector<std::string> notes;          // remarks that are no failures
   std::map<std::string, status_t> status;  // newest status of each process
   std::map<std::string, double> cpu_s;     // of each process, over all its starts
   std::map<int32_t, double> vio_wall_s;    // how long each agent's vio ran
