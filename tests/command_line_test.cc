@@ -220,6 +220,15 @@ TEST(Eval, TheEstimateComesFirst) {
   EXPECT_THAT(outcome.output, HasSubstr("is a folder: give ESTIMATE first, then REFERENCE"));
 }
 
+TEST(Errors, OfAFolderThatCannotBeUsedBeginWithItsPath) {
+  const std::string too_long(300, 'x');
+  const Outcome outcome = RunCommand(
+      "pangea-session report " PANGEA_SOURCE_DIR "/logs/two_walks/session.lcm --out " + too_long);
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_EQ(outcome.output,
+            "pangea-session: " + too_long + "/session.lcm: cannot be used: File name too long\n");
+}
+
 // No server answers on this link.
 TEST(Uplink, SaysAtItsEndWhatIsLostWithoutASpool) {
   const Outcome outcome = RunCommand(

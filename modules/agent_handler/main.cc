@@ -5,7 +5,6 @@
 
 #include <CLI/CLI.hpp>
 #include <filesystem>
-#include <iostream>
 
 #include "agent_handler/agent_handler_process.h"
 #include "agent_handler/keygen.h"
@@ -62,7 +61,6 @@ int main(int argc, char** argv) {
     pangea::OptionsAnnouncer announcer(server_bus, "agent_handler", yaml.PrintWithoutHelp());
     return pangea::RunPolledProcess(link_bus, server_bus, process, announcer);
   } catch (const std::exception& error) {
-    std::cerr << fmt::format("pangea-agent-handler: {}\n", error.what());
-    return 1;
+    return pangea::Failed("pangea-agent-handler", error);
   }
 }

@@ -5,13 +5,13 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <filesystem>
-#include <iostream>
 
 #include "bus/options_announcer.h"
 #include "bus/retransmission/journal_first.h"
 #include "bus/retransmission/journal_reader.h"
 #include "bus/status_log.h"
 #include "messages/channels.h"
+#include "options/command_line.h"
 #include "options/options_arguments.h"
 
 namespace pangea {
@@ -120,8 +120,7 @@ int ProcessMain(int argc, char** argv, const ProcessDescription& description,
     StartLog(description.name, fmt::format("bus {}, {}", url, options.Source()));
     return RunProcess(bus, process, &journal_first);
   } catch (const std::exception& error) {
-    std::cerr << fmt::format("{}: {}\n", description.name, error.what());
-    return 1;
+    return Failed(description.name, error);
   }
 }
 

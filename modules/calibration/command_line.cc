@@ -102,8 +102,7 @@ int RunCommandLine(int argc, char** argv) {
     cv::setNumThreads(1);  // one thread: reproducible results
     return Run(arguments);
   } catch (const std::exception& error) {
-    std::cerr << fmt::format("pangea-calibrate: {}\n", error.what());
-    return 1;
+    return Failed("pangea-calibrate", error);
   }
 }
 

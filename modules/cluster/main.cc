@@ -1,11 +1,9 @@
 // pangea-bridge: connects the hosts of a site that has more than one, over NATS.
 
-#include <fmt/format.h>
-
 #include <CLI/CLI.hpp>
-#include <iostream>
 
 #include "cluster/run_bridge.h"
+#include "options/command_line.h"
 
 // standby: the site's stream              --> the journal; ends when this host is the core
 // core:    the journal, matches --> CoreBridge   --> streams of NATS --> CONSTRAINT
@@ -45,7 +43,6 @@ int main(int argc, char** argv) {
   try {
     return pangea::RunBridge(arguments);
   } catch (const std::exception& error) {
-    std::cerr << fmt::format("pangea-bridge: {}\n", error.what());
-    return 1;
+    return pangea::Failed("pangea-bridge", error);
   }
 }

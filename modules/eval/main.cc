@@ -1,7 +1,5 @@
 // pangea-eval: errors of estimated trajectories against ground truth.
 
-#include <fmt/format.h>
-
 #include <CLI/CLI.hpp>
 #include <exception>
 
@@ -15,8 +13,7 @@ int main(int argc, char** argv) {
   try {
     commands.Run();
   } catch (const std::exception& error) {
-    fmt::print(stderr, "pangea-eval: {}\n", error.what());
-    return 1;
+    return pangea::Failed("pangea-eval", error);
   }
   return pangea::OutputIsWritten("pangea-eval") ? 0 : 1;
 }

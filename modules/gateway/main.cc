@@ -1,12 +1,10 @@
 // pangea-gateway: lets the browsers of phones join a site, over HTTPS and WebSockets.
 
-#include <fmt/format.h>
-
 #include <CLI/CLI.hpp>
-#include <iostream>
 #include <stdexcept>
 
 #include "gateway/commands.h"
+#include "options/command_line.h"
 
 int main(int argc, char** argv) {
   CLI::App app(
@@ -26,8 +24,7 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error);
   } catch (const std::exception& error) {
-    std::cerr << fmt::format("pangea-gateway: {}\n", error.what());
-    return 1;
+    return pangea::Failed("pangea-gateway", error);
   }
   return 0;
 }

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <iostream>
 
 #include "bus/status_log.h"
 #include "link_emulator/link_emulator_process.h"
@@ -46,7 +45,6 @@ int main(int argc, char** argv) {
                                        yaml.PrintWithoutHelp());
     return pangea::RunPolledProcess(agent_bus, server_bus, process, announcer);
   } catch (const std::exception& error) {
-    std::cerr << fmt::format("pangea-link-emulator: {}\n", error.what());
-    return 1;
+    return pangea::Failed("pangea-link-emulator", error);
   }
 }

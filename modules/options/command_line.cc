@@ -5,8 +5,10 @@
 #include <cmath>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <iostream>
 #include <stdexcept>
+#include <system_error>
 
 namespace pangea {
 namespace {
@@ -21,7 +23,28 @@ CLI::Validator NumberThat(bool (*is_good)(double), const std::string& words) {
           words};
 }
 
+// "filesystem error: status: Permission denied [keys]" is no sentence for a user.
+std::string TextOf(const std::exception& error) {
+  const auto* const failed = dynamic_cast<const std::filesystem::filesystem_error*>(&error);
+  if (failed == nullptr || failed->path1().empty()) {
+    return error.what();
+  }
+  std::string paths = failed->path1().string();
+  if (!failed->path2().empty()) {
+    paths += ", " + failed->path2().string();
+  }
+  return fmt::format("{}: cannot be used: {}{}", paths, failed->code().message(),
+                     failed->code() == std::errc::permission_denied
+                         ? "; is it another user's? Get the right to it, or give another path"
+                         : "");
+}
+
 }  // namespace
+
+int Failed(const std::string& program, const std::exception& error) {
+  std::cerr << fmt::format("{}: {}\n", program, TextOf(error));
+  return 1;
+}
 
 int RunSubcommand(CLI::App& app, int argc, char** argv) {
   try {
@@ -29,8 +52,7 @@ int RunSubcommand(CLI::App& app, int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error);
   } catch (const std::exception& error) {
-    std::cerr << fmt::format("{}: {}\n", app.get_name(), error.what());
-    return 1;
+    return Failed(app.get_name(), error);
   }
   return OutputIsWritten(app.get_name()) ? 0 : 1;
 }

@@ -1,9 +1,14 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <exception>
 #include <string>
 
 namespace pangea {
+
+// Writes the error as one line on stderr, after the program's name. One of a file or folder begins
+// with its path, as those of files/text_file.h do. Returns 1, the exit code of the program.
+int Failed(const std::string& program, const std::exception& error);
 
 // Parses the command line and runs the subcommand (a callback of CLI11). An exception becomes one
 // line on stderr, after the program's name. Returns the exit code: 0, 1, or that of CLI11 (above

@@ -42,7 +42,7 @@ int main(int argc, char** argv) {
     pangea::session::PlayKeyframes(bus, options, std::move(keyframes));
     return exit_code;
   } catch (const std::exception& error) {
-    std::cerr << fmt::format("pangea-keyframe-player: {}\n", error.what());
-    return pangea::TellLosses("pangea-keyframe-player", readings, 1);
+    return pangea::TellLosses("pangea-keyframe-player", readings,
+                              pangea::Failed("pangea-keyframe-player", error));
   }
 }

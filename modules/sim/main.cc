@@ -1,10 +1,9 @@
 // pangea-sim: renders recordings in EuRoC's format, with exact ground truth.
 
-#include <fmt/format.h>
-
 #include <CLI/CLI.hpp>
 #include <exception>
 
+#include "options/command_line.h"
 #include "sim/command_line.h"
 
 int main(int argc, char** argv) {
@@ -14,8 +13,7 @@ int main(int argc, char** argv) {
   try {
     command.Run();
   } catch (const std::exception& error) {
-    fmt::print(stderr, "pangea-sim: {}\n", error.what());
-    return 1;
+    return pangea::Failed("pangea-sim", error);
   }
   return 0;
 }

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <iostream>
 
 #include "bus/status_log.h"
 #include "link/agent_key.h"
@@ -89,7 +88,6 @@ int main(int argc, char** argv) {
     }
     return pangea::Run(arguments, options, options_arguments.Source(), yaml.PrintWithoutHelp());
   } catch (const std::exception& error) {
-    std::cerr << fmt::format("pangea-uplink: {}\n", error.what());
-    return 1;
+    return pangea::Failed("pangea-uplink", error);
   }
 }

@@ -1,12 +1,10 @@
 // pangea-viewer: shows a bus or a log in a browser.
 
-#include <fmt/format.h>
-
 #include <CLI/CLI.hpp>
 #include <filesystem>
-#include <iostream>
 
 #include "bus/process.h"
+#include "options/command_line.h"
 #include "viewer/serve.h"
 
 namespace {
@@ -60,8 +58,7 @@ int main(int argc, char** argv) {
       return ServeLog(log, options, page);
     }
   } catch (const std::exception& error) {
-    std::cerr << fmt::format("pangea-viewer: {}\n", error.what());
-    return 1;
+    return pangea::Failed("pangea-viewer", error);
   }
   return 0;
 }

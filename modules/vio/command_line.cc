@@ -165,8 +165,7 @@ int RunCommandLine(int argc, char** argv) {
     KeepFreedMemory();
     return Run(arguments, file_options.live_imu, options.Source());
   } catch (const std::exception& error) {
-    std::cerr << fmt::format("pangea-vio: {}\n", error.what());
-    return 1;
+    return Failed("pangea-vio", error);
   }
 }
 

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <iostream>
 #include <optional>
 #include <stdexcept>
 
@@ -178,7 +177,6 @@ int main(int argc, char** argv) {
   try {
     return pangea::session::Run(&arguments);
   } catch (const std::exception& error) {
-    std::cerr << fmt::format("pangea-server: {}\n", error.what());
-    return 1;
+    return pangea::Failed("pangea-server", error);
   }
 }
