@@ -52,9 +52,9 @@ cv::Size SizeOfImages(const fs::path& mav0) {
   throw std::runtime_error(fmt::format("{}: no PNG or JPEG that it names can be read", csv));
 }
 
-ImuNoise NoiseOf(const fs::path& mav0) {
+EurocImuCalibration ImuOf(const fs::path& mav0) {
   const std::string yaml = (mav0 / "imu0/sensor.yaml").string();
-  return Exists(yaml) ? ReadEurocImuCalibration(yaml).noise : kPhoneNoise;
+  return Exists(yaml) ? ReadEurocImuCalibration(yaml) : EurocImuCalibration{kPhoneNoise, {}};
 }
 
 void LinkEntries(const fs::path& from, const fs::path& to) {
@@ -65,13 +65,6 @@ void LinkEntries(const fs::path& from, const fs::path& to) {
       fs::create_symlink(fs::absolute(entry.path()), to / name);
     }
   }
-}
-
-void WriteSensorYaml(const fs::path& folder, const Result& result, const ImuNoise& noise) {
-  const fs::path mav0 = folder / "mav0";
-  const double rate_hz = result.image_rate_hz > 0 ? result.image_rate_hz : 30;
-  WriteTextFile((mav0 / "cam0/sensor.yaml").string(), CameraYaml(result, rate_hz));
-  WriteTextFile((mav0 / "imu0/sensor.yaml").string(), ImuYaml(result, noise));
 }
 
 }  // namespace
@@ -90,7 +83,8 @@ CalibrationFolder::CalibrationFolder(const std::string& recording, const std::st
   const fs::path from = Mav0Of(recording), to = fs::path(part_) / "mav0";
   recording_mav0_ = from.string();
   const cv::Size size = SizeOfImages(from);
-  const ImuNoise noise = NoiseOf(from);
+  const EurocImuCalibration imu = ImuOf(from);
+  T_s_body_ = imu.T_s_body;
   Result nothing_known;
   nothing_known.sigma.setConstant(0.1);  // the values written must be readable
   nothing_known.parameters.camera = GuessedCamera(size.width, size.height);
@@ -98,7 +92,7 @@ CalibrationFolder::CalibrationFolder(const std::string& recording, const std::st
     LinkEntries(from, to);
     LinkEntries(from / "cam0", to / "cam0");
     LinkEntries(from / "imu0", to / "imu0");
-    WriteSensorYaml(part_, nothing_known, noise);
+    WriteSensorYaml(nothing_known, imu.noise);
   } catch (...) {
     Remove();
     throw;
@@ -109,6 +103,13 @@ CalibrationFolder::~CalibrationFolder() {
   if (!finished_) {
     Remove();
   }
+}
+
+void CalibrationFolder::WriteSensorYaml(const Result& result, const ImuNoise& noise) const {
+  const fs::path mav0 = fs::path(part_) / "mav0";
+  const double rate_hz = result.image_rate_hz > 0 ? result.image_rate_hz : 30;
+  WriteTextFile((mav0 / "cam0/sensor.yaml").string(), CameraYaml(result, rate_hz, T_s_body_));
+  WriteTextFile((mav0 / "imu0/sensor.yaml").string(), ImuYaml(result, noise, T_s_body_));
 }
 
 void CalibrationFolder::Remove() {
@@ -127,7 +128,7 @@ std::string CalibrationFolder::AboutTheRecording(std::string text) const {
 
 void CalibrationFolder::Finish(const Result& result, const ImuNoise& noise,
                                const std::string& summary) {
-  WriteSensorYaml(part_, result, noise);
+  WriteSensorYaml(result, noise);
   WriteTextFile((fs::path(part_) / "calibration.txt").string(), summary);
   fs::rename(part_, out_);
   finished_ = true;

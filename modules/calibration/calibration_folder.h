@@ -30,9 +30,11 @@ class CalibrationFolder {
   void Finish(const Result& result, const ImuNoise& noise, const std::string& summary);
 
  private:
+  void WriteSensorYaml(const Result& result, const ImuNoise& noise) const;
   void Remove();
 
   std::string recording_mav0_, out_, part_;
+  Rigid3 T_s_body_;  // the recording's: its ground truth refers to the rig
   bool finished_ = false;
 };
 

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <opencv2/imgcodecs.hpp>
+#include <tuple>
 
 #include "calibration/calibration_folder.h"
 #include "calibration/priors.h"
@@ -11,6 +12,7 @@
 #include "calibration/summary.h"
 #include "core/rigid3.h"
 #include "files/text_file.h"
+#include "recording/euroc.h"
 #include "recording/euroc_calibration.h"
 #include "recording/sensor_file.h"
 
@@ -130,6 +132,27 @@ TEST_F(Program, OnlyACalibratedFolderIsThereInTheEnd) {
   EXPECT_EQ(ReadTextFile(Path("out/calibration.txt")), "known");
   EXPECT_DOUBLE_EQ(ReadEurocCamera(Path("out/mav0/cam0/sensor.yaml")).fx,
                    Some().parameters.camera.fx);
+}
+
+// As EuRoC's: ground truth is that of the rig, and the IMU is elsewhere on it.
+TEST_F(Program, TheGroundTruthStaysThatOfTheImu) {
+  MakeRecording();
+  const Rigid3 T_s_body(ExpSo3({0, 0, 1.5}), {0.5, -0.25, 1});
+  WriteTextFile(Path("in/mav0/imu0/sensor.yaml"), ImuYaml(Some(), ImuNoise{}, T_s_body));
+  fs::create_directories(folder_ / "in/mav0/state_groundtruth_estimate0");
+  WriteTextFile(Path("in/mav0/state_groundtruth_estimate0/data.csv"),
+                "#t\n100000000,1,2,3,1,0,0,0\n");
+  Result result = Some();
+  CameraModel& camera = result.parameters.camera;
+  std::tie(camera.width, camera.height, camera.cx, camera.cy) = std::tuple(64, 48, 32, 24);
+  CalibrationFolder(Path("in"), Path("out")).Finish(result, {}, "known");
+  std::vector<std::string> warnings;
+  const Trajectory before = ReadEurocGroundTruthOf(Path("in"), &warnings);
+  const EurocRecording after(Path("out"));
+  ASSERT_EQ(after.ground_truth().size(), 1u);
+  EXPECT_LT((before[0].T.t - Eigen::Vector3d(1.5, 1.75, 4)).norm(), 1e-8);
+  EXPECT_LT(before[0].T.Minus(after.ground_truth()[0].T).norm(), 1e-8);
+  EXPECT_LT(after.camera().T_body_cam.Minus(camera.T_body_cam).norm(), 1e-8);
 }
 
 TEST_F(Program, WhatIsNoRecordingAndWhatExistsIsRefusedWithTheMend) {

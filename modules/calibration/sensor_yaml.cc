@@ -10,11 +10,12 @@ namespace {
 constexpr double kTranslationSigma_m = 0.05;
 
 // T_BS in EuRoC's format.
-std::string Matrix(const Eigen::Quaterniond& q) {
-  const Eigen::Matrix3d R = q.toRotationMatrix();
+std::string Matrix(const Rigid3& T) {
+  const Eigen::Matrix3d R = T.q.toRotationMatrix();
   std::string data;
   for (int row = 0; row < 3; ++row) {
-    data += fmt::format("{:.9f}, {:.9f}, {:.9f}, 0, ", R(row, 0), R(row, 1), R(row, 2));
+    data +=
+        fmt::format("{:.9f}, {:.9f}, {:.9f}, {:.9g}, ", R(row, 0), R(row, 1), R(row, 2), T.t[row]);
   }
   return fmt::format("T_BS:\n  cols: 4\n  rows: 4\n  data: [{}0, 0, 0, 1]\n", data);
 }
@@ -25,11 +26,11 @@ std::string List(const Eigen::Vector3d& v) {
 
 }  // namespace
 
-std::string CameraYaml(const Result& result, double rate_hz) {
+std::string CameraYaml(const Result& result, double rate_hz, const Rigid3& T_s_body) {
   const CameraModel& c = result.parameters.camera;
   const Tangent& sigma = result.sigma;
   const bool fisheye = c.kind == CameraModel::Kind::kEquidistant;
-  std::string text = "sensor_type: camera\n" + Matrix(c.T_body_cam.q);
+  std::string text = "sensor_type: camera\n" + Matrix(T_s_body * c.T_body_cam);
   text += fmt::format("rotation_sigma: {}  # rad, about the body's axes\n",
                       List(sigma.segment<3>(kRotation)));
   text += fmt::format("translation_sigma: {}  # m: not estimated\n", kTranslationSigma_m);
@@ -51,8 +52,8 @@ std::string CameraYaml(const Result& result, double rate_hz) {
   return text;
 }
 
-std::string ImuYaml(const Result& result, const ImuNoise& noise) {
-  std::string text = "sensor_type: imu\n" + Matrix(Eigen::Quaterniond::Identity());
+std::string ImuYaml(const Result& result, const ImuNoise& noise, const Rigid3& T_s_body) {
+  std::string text = "sensor_type: imu\n" + Matrix(T_s_body);
   text += fmt::format("rate_hz: {:.4g}\n", noise.rate_hz);
   text += fmt::format("gyroscope_noise_density: {:.6g}\ngyroscope_random_walk: {:.6g}\n",
                       noise.gyro_noise_density, noise.gyro_random_walk);

@@ -9,7 +9,9 @@
 
 namespace pangea::calibration {
 
-std::string CameraYaml(const Result& result, double rate_hz);
-std::string ImuYaml(const Result& result, const ImuNoise& noise);
+// `T_s_body`: pose of the IMU in the frame of the recording's rig, which its ground truth refers
+// to.
+std::string CameraYaml(const Result& result, double rate_hz, const Rigid3& T_s_body = {});
+std::string ImuYaml(const Result& result, const ImuNoise& noise, const Rigid3& T_s_body = {});
 
 }  // namespace pangea::calibration
