@@ -53,8 +53,8 @@ cv::Size SizeOfImages(const fs::path& mav0) {
 }
 
 EurocImuCalibration ImuOf(const fs::path& mav0) {
-  const std::string yaml = (mav0 / "imu0/sensor.yaml").string();
-  return Exists(yaml) ? ReadEurocImuCalibration(yaml) : EurocImuCalibration{kPhoneNoise, {}};
+  const auto file = FindEurocCalibrationFile(mav0.string(), "imu0");
+  return file ? ReadEurocImuCalibration(*file) : EurocImuCalibration{kPhoneNoise, {}};
 }
 
 void LinkEntries(const fs::path& from, const fs::path& to) {

@@ -155,6 +155,17 @@ TEST_F(Program, TheGroundTruthStaysThatOfTheImu) {
   EXPECT_LT(after.camera().T_body_cam.Minus(camera.T_body_cam).norm(), 1e-8);
 }
 
+TEST_F(Program, TheNoiseOfTumVisFileIsKept) {
+  MakeRecording();
+  fs::create_directories(folder_ / "in/dso");
+  WriteTextFile(Path("in/dso/imu_config.yaml"),
+                "accelerometer_noise_density: 0.0028\naccelerometer_random_walk: 0.00086\n"
+                "gyroscope_noise_density: 0.00016\ngyroscope_random_walk: 0.000022\n"
+                "update_rate: 200.0\n");
+  const CalibrationFolder folder(Path("in"), Path("out"));
+  EXPECT_DOUBLE_EQ(EurocRecording(folder.part()).imu_noise().gyro_noise_density, 0.00016);
+}
+
 TEST_F(Program, WhatIsNoRecordingAndWhatExistsIsRefusedWithTheMend) {
   const auto complaint = [&](const std::string& from, const std::string& to) -> std::string {
     try {

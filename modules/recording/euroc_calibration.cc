@@ -163,8 +163,8 @@ double TimeOffset(const YAML::Node& root, const std::string& file, double readou
 
 }  // namespace
 
-std::string EurocCalibrationFile(const std::string& mav0, const std::string& sensor) {
-  const bool is_camera = sensor == "cam0";
+std::optional<std::string> FindEurocCalibrationFile(const std::string& mav0,
+                                                    const std::string& sensor) {
   std::string euroc = fmt::format("{}/{}/sensor.yaml", mav0, sensor);
   std::error_code error;
   if (std::filesystem::symlink_status(euroc, error).type() !=
@@ -172,13 +172,18 @@ std::string EurocCalibrationFile(const std::string& mav0, const std::string& sen
     return euroc;
   }
   std::string tum_vi =
-      fmt::format("{}/../dso/{}", mav0, is_camera ? "camchain.yaml" : "imu_config.yaml");
-  if (Exists(tum_vi)) {
-    return tum_vi;
+      fmt::format("{}/../dso/{}", mav0, sensor == "cam0" ? "camchain.yaml" : "imu_config.yaml");
+  return Exists(tum_vi) ? std::optional(std::move(tum_vi)) : std::nullopt;
+}
+
+std::string EurocCalibrationFile(const std::string& mav0, const std::string& sensor) {
+  if (auto file = FindEurocCalibrationFile(mav0, sensor)) {
+    return *std::move(file);
   }
-  Throw(euroc, fmt::format("there is no such file. Kalibr's {} serves under that name, and "
-                           "pangea-calibrate makes one from the recording",
-                           is_camera ? "camchain-imucam.yaml" : "imu.yaml"));
+  Throw(fmt::format("{}/{}/sensor.yaml", mav0, sensor),
+        fmt::format("there is no such file. Kalibr's {} serves under that name, and "
+                    "pangea-calibrate makes one from the recording",
+                    sensor == "cam0" ? "camchain-imucam.yaml" : "imu.yaml"));
 }
 
 CameraModel ReadEurocCamera(const std::string& sensor_yaml) {

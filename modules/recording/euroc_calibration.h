@@ -18,7 +18,10 @@ struct EurocImuCalibration {
 };
 
 // Path of the calibration of "cam0" or "imu0": sensor.yaml or, as in TUM-VI, in dso/ beside mav0.
-// Throws std::runtime_error when there is neither.
+// Nothing when there is neither.
+std::optional<std::string> FindEurocCalibrationFile(const std::string& mav0,
+                                                    const std::string& sensor);
+// The same, but throws std::runtime_error when there is neither.
 std::string EurocCalibrationFile(const std::string& mav0, const std::string& sensor);
 // Note: T_body_cam of the result is the file's T_BS, from the camera to the rig frame.
 // All functions throw std::runtime_error with file and field.
