@@ -14,6 +14,8 @@
 
 #include "agent_handler/link_test_world.h"
 #include "link/agent_key.h"
+#include "link/anchor_wire.h"
+#include "messages/testing/test_anchors.h"
 #include "messages/testing/test_keyframes.h"
 #include "pangea/again_t.hpp"
 #include "pangea/pose_t.hpp"
@@ -183,6 +185,35 @@ TEST_F(LinkWorld, AnAgentIsShutOutWithItsKey) {
   std::filesystem::rename(folder / "away", KeyFile(1));
   Run(10);
   ExpectDelivered(4);
+}
+
+// Its texts could not be encoded again: the journal would not read them at its next start.
+TEST_F(LinkWorld, AnEditWithAZeroByteIsRefused) {
+  MakeKeyFile(KeyFile(2), 2);
+  UplinkSession session(2, ReadKeyFileOf(KeyFile(2), 2));
+  link_bus.Subscribe("LINK_DOWN_2", [&](const std::string&, Bytes data) { session.Open(data); });
+  std::string summary;
+  server_bus.Subscribe("STATUS_agent_handler", [&](const std::string&, Bytes data) {
+    status_t status{};
+    ASSERT_TRUE(DecodeMessage(data, &status));
+    summary = status.summary;
+  });
+  Run(2);
+  for (int64_t number = 1; number < 4; ++number) {
+    link_bus.Publish("LINK_UP_2", session.Seal({LinkKind::kHello, number,
+                                                Encode(LinkHello{OurSoftware(), {}})}));
+    Run(1);
+  }
+  AnchorEdit edit = TestEdit({2, 5}, 1, 2);
+  edit.payload = "a~b";
+  std::vector<uint8_t> body = EncodeAnchorEdit(edit);
+  *std::ranges::find(body, '~') = 0;
+  link_bus.Publish("LINK_UP_2", session.Seal({LinkKind::kAnchorEdit, 4, body}));
+  Run(2);
+  KillHandler();
+  StartHandler();
+  Run(2);
+  EXPECT_EQ(summary, "1 agents, 0 keyframes in the journal") << "and no damage";
 }
 
 // A key that is half written, or another that others may read, must not keep one in.

@@ -23,6 +23,11 @@ bool IsName(const std::string& name) {
                       [](unsigned char c) { return c < 0x20 || c == 0x7f; });
 }
 
+// A text with a zero byte would be encoded only up to it, as a message that does not decode.
+bool IsPayload(const std::string& payload) {
+  return payload.size() <= kMaxAnchorPayload && payload.find('\0') == std::string::npos;
+}
+
 bool IsUtime(int64_t utime) { return utime >= 0 && utime <= kMaxUtime; }
 bool IsRevision(int64_t revision) { return revision >= 0 && revision <= kMaxRevision; }
 bool IsAgent(int32_t agent_id) { return agent_id >= 0 && agent_id <= 65535; }
@@ -158,7 +163,7 @@ Parsed<AnchorEdit> Parse(const anchor_edit_t& m) {
       m.seq < -1 || m.may < anchor_edit_t::MAY_UNKNOWN || m.may > anchor_edit_t::MAY_EDIT_ALL) {
     return Refused<AnchorEdit>("anchor edit: invalid id, editor, revision or right");
   }
-  if (!IsName(m.name) || m.payload.size() > kMaxAnchorPayload) {
+  if (!IsName(m.name) || !IsPayload(m.payload)) {
     return Refused<AnchorEdit>("anchor edit: name or payload too long, or not printable");
   }
   if (m.placement < anchor_edit_t::PLACEMENT_SAME || m.placement > anchor_edit_t::PLACEMENT_PIXEL) {
@@ -195,7 +200,7 @@ Parsed<AnchorState> Parse(const anchor_t& m) {
   if (!T_odom_anchor.value || !covariance) {
     return Refused<AnchorState>("anchor: invalid transform or covariance");
   }
-  if (!IsName(m.name) || m.payload.size() > kMaxAnchorPayload ||
+  if (!IsName(m.name) || !IsPayload(m.payload) ||
       (m.state != anchor_t::STATE_PLACED && m.state != anchor_t::STATE_GONE)) {
     return Refused<AnchorState>("anchor: invalid name, payload or state");
   }

@@ -117,6 +117,7 @@ TEST(AnchorMessages, EditsThatAreRefused) {
       [](anchor_edit_t& m) { m.name = std::string(kMaxAnchorName + 1, 'a'); },
       [](anchor_edit_t& m) { m.name = "two\nlines"; },
       [](anchor_edit_t& m) { m.payload = std::string(kMaxAnchorPayload + 1, 'a'); },
+      [](anchor_edit_t& m) { m.payload = std::string("a\0b", 3); },
       [](anchor_edit_t& m) { m.keyframe_seq = -1; },
       [](anchor_edit_t& m) { m.utime = -1; },
       [](anchor_edit_t& m) { m.pixel[1] = NAN; },
@@ -137,6 +138,7 @@ TEST(AnchorMessages, StatesThatAreRefused) {
   const std::vector<std::function<void(anchor_t&)>> damages = {
       [](anchor_t& m) { m.revision = 0; },
       [](anchor_t& m) { m.state = 0; },
+      [](anchor_t& m) { m.payload = std::string("a\0b", 3); },
       [](anchor_t& m) { m.map.agent_id = 0; },
       [](anchor_t& m) { m.group.agent_id = 70000; },
       [](anchor_t& m) { m.group_revision = -1; },
