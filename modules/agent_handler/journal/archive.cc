@@ -348,19 +348,18 @@ std::string Archive::JournalPath() const {
 void Archive::PublishHave() {
   PublishJournalFile();
   auto it = by_age_.begin();
+  size_t told = 0;  // gaps of this map; a thinned journal has many
   do {
     have_t message{};
-    for (; it != by_age_.end() && message.maps.size() < kMaxHaveMaps; ++it) {
-      const std::vector<SeqGap> lost = Lost(*it);
-      if (!message.gaps.empty() && message.gaps.size() + lost.size() > kMaxHaveGaps) {
-        break;  // continue in the next message: a thinned journal has many gaps
-      }
+    for (; it != by_age_.end() && message.maps.size() < kMaxHaveMaps; ++it, told = 0) {
       message.maps.push_back(ToMessage(*it));
       message.highest_seq.push_back(have_.at(*it));
-      for (const SeqGap& gap : lost) {
-        if (message.gaps.size() < kMaxHaveGaps) {
-          message.gaps.push_back(ToMessage(gap));
-        }
+      const std::vector<SeqGap> lost = Lost(*it);
+      for (; told < lost.size() && message.gaps.size() < kMaxHaveGaps; ++told) {
+        message.gaps.push_back(ToMessage(lost[told]));
+      }
+      if (told < lost.size()) {
+        break;  // the next message continues with this map
       }
     }
     message.num_maps = static_cast<int16_t>(message.maps.size());
