@@ -335,6 +335,9 @@ TEST_F(LinkWorld, TheOptionsInForceAreJournalled) {
   StartHandler();
   say("fusion", kWall, "min_inliers: 20\n");
   say("fusion", kWall + 1, "min_inliers: 20\n");
+  KillHandler();
+  StartHandler();
+  say("fusion", kWall - 1, "min_inliers: 22\n");  // the host's clock went back
   say("posegraph", kWall + 1, "scope: paper\n");
   say("posegraph", kWall, "scope: all\n");  // of one that has ended
   say("not a name", kWall, "");
@@ -348,9 +351,10 @@ TEST_F(LinkWorld, TheOptionsInForceAreJournalled) {
                           journalled.push_back(channel + " " + message.yaml);
                           return true;
                         });
-  EXPECT_THAT(journalled, testing::ElementsAre("OPTIONS_fusion min_inliers: 20\n",
-                                               "OPTIONS_posegraph scope: all\n",
-                                               "OPTIONS_posegraph scope: paper\n"));
+  EXPECT_THAT(
+      journalled,
+      testing::ElementsAre("OPTIONS_fusion min_inliers: 20\n", "OPTIONS_posegraph scope: all\n",
+                           "OPTIONS_fusion min_inliers: 22\n", "OPTIONS_posegraph scope: paper\n"));
 }
 
 // A budget costs corners, never a keyframe: the chain of poses has no gap.

@@ -195,6 +195,8 @@ bool Archive::LoadOptions(Bytes data) {
     node_.Count("journal_events_unreadable");
     return !IsDamaged<options_t>(data);
   }
+  // Any start after this one is newer, also by a clock that went back meanwhile.
+  options.value->utime = 0;
   options_in_force_[options.value->process] = *std::move(options.value);
   return true;
 }
