@@ -167,7 +167,7 @@ void AgentHandlerProcess::OnLinkUp(const std::string& channel, Bytes data) {
   agent.heard_us = now_us_;
   agent.new_uplink = agent.new_uplink || opened.new_uplink;
   if (!agent.handler && !archive_.MayJoin(agent_id)) {
-    return;  // else the agent would be told that keyframes are kept which are not yet
+    return;  // else it would be told of keyframes that are not kept, or send some twice
   }
   if (!agent.handler) {
     agent.handler.emplace(MakeHandler(agent_id));

@@ -2,9 +2,11 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <cmath>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -185,6 +187,26 @@ TEST_F(LinkWorld, AnAgentIsShutOutWithItsKey) {
   std::filesystem::rename(folder / "away", KeyFile(1));
   Run(10);
   ExpectDelivered(4);
+}
+
+// Its keyframes wait for the disk meanwhile, and the journal does not have them yet.
+TEST_F(LinkWorld, AnAgentThatComesBackIsAskedForNothingTwice) {
+  std::signal(SIGXFSZ, SIG_IGN);
+  Run(2);
+  rlimit limit{};
+  getrlimit(RLIMIT_FSIZE, &limit);
+  const rlimit full{std::filesystem::file_size(journal_path), limit.rlim_max};
+  setrlimit(RLIMIT_FSIZE, &full);
+  PublishKeyframes(2);
+  Run(2);
+  std::filesystem::rename(KeyFile(1), folder / "away");
+  Run(2);
+  std::filesystem::rename(folder / "away", KeyFile(1));
+  Run(3);
+  setrlimit(RLIMIT_FSIZE, &limit);
+  Run(5);
+  ExpectDelivered(2);
+  EXPECT_EQ(acknowledged, 1);
 }
 
 // Its texts could not be encoded again: the journal would not read them at its next start.

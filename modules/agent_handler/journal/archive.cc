@@ -230,6 +230,13 @@ void Archive::Append(const KeyframeId& id, std::vector<uint8_t> bytes) {
   unsynced_.push_back({id, std::move(bytes), place});
 }
 
+bool Archive::MayJoin(int32_t agent_id) const {
+  return !replication_->Awaits(agent_id) &&
+         std::ranges::none_of(unsynced_, [agent_id](const Unsynced& keyframe) {
+           return keyframe.id.map.agent_id == agent_id;
+         });
+}
+
 void Archive::WriteDue() {
   if (!journal_->HasUnsynced() || now_us_ - oldest_unsynced_us_ < kSyncInterval_us) {
     return;

@@ -69,9 +69,10 @@ class Archive {
     return journal_->HasUnsynced() || resend_queue_.waiting() + anchor_edits_.waiting() > 0;
   }
   bool disk_refuses() const { return disk_refuses_; }
-  // Whether agents may be answered, and whether this agent's session may begin.
+  // Whether agents may be answered, and whether this agent's session may begin: have() must have
+  // all of its keyframes.
   bool MayAnswer() const { return replication_->Works(now_us_); }
-  bool MayJoin(int32_t agent_id) const { return !replication_->Awaits(agent_id); }
+  bool MayJoin(int32_t agent_id) const;
   int64_t num_keyframes() const { return index_.num_keyframes(); }
 
  private:
