@@ -79,11 +79,15 @@ void AgentHandlerProcess::OnOthers(const Others& others, const others_t& message
   SendBestEffort(others.map.agent_id, LinkKind::kOthers, EncodeMessage(message));
 }
 
+bool AgentHandlerProcess::IsThere(const Agent& agent) const {
+  return agent.session.HasUplink() && now_us_ - agent.heard_us < kAway_us;
+}
+
 // The packet is sent once; an agent that is away does not get it.
 void AgentHandlerProcess::SendBestEffort(int32_t agent_id, LinkKind kind,
                                          std::vector<uint8_t> body) {
   const auto agent = agents_.find(agent_id);
-  if (agent != agents_.end() && agent->second.session.HasUplink()) {
+  if (agent != agents_.end() && IsThere(agent->second)) {
     SendDown(agent_id, &agent->second, agent->second.session.Seal(kind, std::move(body)));
   }
 }
@@ -204,8 +208,8 @@ void AgentHandlerProcess::JournalReady(Agent* agent) {
 
 void AgentHandlerProcess::SendAcks() {
   for (auto& [agent_id, agent] : agents_) {
-    const auto ack = agent.handler ? agent.handler->TakeAck(now_us_) : std::nullopt;
-    if (ack && agent.session.HasUplink()) {
+    const bool answers = agent.handler && IsThere(agent);
+    if (const auto ack = answers ? agent.handler->TakeAck(now_us_) : std::nullopt) {
       SendDown(agent_id, &agent, agent.session.Seal(LinkKind::kAck, Encode(*ack)));
     }
   }
@@ -215,7 +219,7 @@ void AgentHandlerProcess::SendAnchors() {
   for (auto& entry : agents_) {
     const auto agent_id = entry.first;
     auto& agent = entry.second;
-    if (agent.session.HasUplink() && now_us_ - agent.heard_us < kAway_us) {
+    if (IsThere(agent)) {
       anchors_.SendDue(agent_id, now_us_, [&](LinkKind kind, std::vector<uint8_t> body) {
         return SendDown(agent_id, &agent, agent.session.Seal(kind, std::move(body)));
       });

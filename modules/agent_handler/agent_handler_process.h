@@ -53,6 +53,8 @@ class AgentHandlerProcess : public PolledProcess {
     int64_t keyframes = 0;
   };
   void OnLinkUp(const std::string& channel, Bytes data);
+  // Whether the agent's uplink sent something lately.
+  bool IsThere(const Agent& agent) const;
   // Returns the packet's bytes on the wire.
   int64_t SendDown(int32_t agent_id, Agent* agent, Bytes packet);
   void ReadKeys();
