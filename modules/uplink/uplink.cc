@@ -143,7 +143,7 @@ void Uplink::OnAck(const LinkAck& ack, int64_t now_us) {
       map.correction = correction;
       map.sent_us = 0;
     }
-    hello_due_ = true;  // a hello confirms the correction
+    map.confirms = hello_due_ = true;
   }
 }
 
@@ -151,11 +151,12 @@ bool Uplink::Connected(int64_t now_us) const {
   return last_ack_us_ && now_us - *last_ack_us_ < kConnected_us;
 }
 
-// The newest map, and the newest of the other maps that have keyframes to send.
+// The newest map, and the newest of the other maps that have keyframes to send, or a correction to
+// confirm.
 std::vector<MapId> Uplink::Announced() const {
   std::vector<MapId> announced;
   for (auto it = maps_.rbegin(); it != maps_.rend() && announced.size() < kMaxLinkMaps; ++it) {
-    if (it == maps_.rbegin() || sender_.spooled(it->first) > 0) {
+    if (it == maps_.rbegin() || sender_.spooled(it->first) > 0 || it->second.confirms) {
       announced.push_back(it->first);
     }
   }
@@ -197,9 +198,10 @@ std::vector<uint8_t> Uplink::Hello() {
   const std::vector<MapId> announced = Announced();
   GiveSlots(announced);
   for (const MapId& id : announced) {
-    const OutgoingMap& map = maps_.at(id);
+    OutgoingMap& map = maps_.at(id);
     hello.maps.push_back(
         {id, map.given_up, map.correction ? map.correction->revision : 0, *map.slot});
+    map.confirms = false;
   }
   return Encode(hello);
 }

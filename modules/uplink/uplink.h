@@ -107,6 +107,7 @@ class Uplink {
     int probes = 0;           // since its last new keyframe, while there is a newer map
     int64_t received_us = 0;  // when the newest keyframe came
     std::optional<Correction> correction;
+    bool confirms = false;         // the next hello must confirm the correction
     int64_t applied_revision = 0;  // from the agent's poses
     int64_t sent_us = 0;
   };
