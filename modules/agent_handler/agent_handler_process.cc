@@ -29,13 +29,14 @@ constexpr int kIdle_ms = 20;
 AgentHandlerProcess::AgentHandlerProcess(Bus& link_bus, Bus& server_bus,
                                          const std::string& journal_path,
                                          const std::string& key_folder, int64_t now_utime,
-                                         const AgentHandlerOptions& options)
+                                         const AgentHandlerOptions& options,
+                                         const std::function<void()>& before_mend)
     : link_bus_(link_bus),
       key_folder_name_(key_folder),
       key_folder_(key_folder),
       options_(options),
       node_(server_bus, "agent_handler"),
-      archive_(node_, journal_path, now_utime, options.replicated),
+      archive_(node_, journal_path, now_utime, options.replicated, before_mend),
       anchors_(node_, archive_) {
   node_.Watch(link_bus);
   ReadKeys();

@@ -8,6 +8,7 @@
 // (journal/replication.h). A packet that cannot be decrypted with the key of the agent on whose
 // channel it came is counted and dropped; it costs one attempt and changes no state.
 
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -28,17 +29,15 @@ class AgentHandlerProcess : public PolledProcess {
   // Further keys are refused. The receive caches of all agents take at most 210 MB.
   static constexpr size_t kMaxAgents = KeyFolder::kMaxKeys;
 
-  // `now_utime`: wall clock. Throws std::runtime_error if the journal or the folder of keys cannot
-  // be used.
+  // `now_utime`: wall clock. `before_mend`: as for Journal. Throws std::runtime_error if the
+  // journal or the folder of keys cannot be used.
   AgentHandlerProcess(Bus& link_bus, Bus& server_bus, const std::string& journal_path,
                       const std::string& key_folder, int64_t now_utime,
-                      const AgentHandlerOptions& options);
+                      const AgentHandlerOptions& options,
+                      const std::function<void()>& before_mend = nullptr);
 
   int Poll(int64_t steady_us) override;
   void Tick(int64_t now_utime) override;
-
-  // Whether the journal was damaged when this process opened it.
-  bool journal_was_damaged() const { return !archive_.Damage().empty(); }
 
  private:
   struct Agent {

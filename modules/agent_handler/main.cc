@@ -50,11 +50,13 @@ int main(int argc, char** argv) {
     pangea::RequireTwoUrls("--link", link, "--server", server);
     pangea::LcmBus link_bus(link, pangea::LcmBus::Fragments::kRefused);
     pangea::LcmBus server_bus(server);
+    const auto remove_checkpoints = [&checkpoints] {
+      if (!checkpoints.empty()) {
+        std::filesystem::remove_all(checkpoints);
+      }
+    };
     pangea::AgentHandlerProcess process(link_bus, server_bus, journal, keys, pangea::WallUtime(),
-                                        options);
-    if (process.journal_was_damaged() && !checkpoints.empty()) {
-      std::filesystem::remove_all(checkpoints);
-    }
+                                        options, remove_checkpoints);
     pangea::StartLog("pangea-agent-handler",
                      fmt::format("bus {}, link {}, journal {}, keys {}, {}", server, link, journal,
                                  keys, options_arguments.Source()));

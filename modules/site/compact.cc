@@ -22,10 +22,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Opens the journal exclusively; damaged parts are kept in a file beside it.
-Journal Lock(const fs::path& journal) {
-  return Journal(journal.string(),
-                 [](const std::string&, Bytes, const JournalPlace&) { return true; });
+// Opens the journal exclusively; damaged parts are kept in a file beside it. The checkpoints are
+// removed before the damage is, for they have what it destroyed.
+Journal Lock(const fs::path& journal, const fs::path& checkpoints) {
+  return Journal(
+      journal.string(), [](const std::string&, Bytes, const JournalPlace&) { return true; },
+      [&checkpoints] { fs::remove_all(checkpoints); });
 }
 
 // Returns the contents that it wrote.
@@ -81,7 +83,7 @@ CompactSummary Compact(const Site& site, const std::optional<ThinJournal>& thin,
     throw std::runtime_error(
         fmt::format("{}: there is no journal yet, nothing to compact", journal.string()));
   }
-  const Journal old = Lock(journal);
+  const Journal old = Lock(journal, site.checkpoints());
   if (const std::string said = old.mend().Said(journal); !said.empty()) {
     std::cerr << said << "\n";
   }

@@ -74,6 +74,19 @@ TEST(Compact, DropsDamageAndKeepsACopyOfIt) {
             1);
 }
 
+// They have what the journal lost, and the next server would not see that it ever had it.
+TEST(Compact, CheckpointsGoWithTheDamageAlthoughItFails) {
+  const Site site = MakeSite(FreshFolder("compact_mended") / "hall", WalksOf({1}));
+  std::fstream file(site.journal(), std::ios::in | std::ios::out | std::ios::binary);
+  file.seekp(40'000);
+  file.write("damage", 6);
+  file.close();
+  fs::create_directories(site.checkpoints());
+  EXPECT_NE(OnFullDisk(300'000, [&] { Compact(site); }), "");
+  EXPECT_EQ(FoundAtOpening(site), "") << "it is mended";
+  EXPECT_FALSE(fs::exists(site.checkpoints()));
+}
+
 TEST(Compact, RefusesWhileTheSiteOrItsJournalIsInUse) {
   const Site site = MakeSite(FreshFolder("compact_used") / "hall", WalksOf({1}));
   {

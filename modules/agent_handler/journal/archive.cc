@@ -57,15 +57,14 @@ seq_gap_t ToMessage(const SeqGap& gap) {
 
 }  // namespace
 
-Archive::Archive(Node& node, const std::string& journal_path, int64_t now_utime, bool replicated)
+Archive::Archive(Node& node, const std::string& journal_path, int64_t now_utime, bool replicated,
+                 const std::function<void()>& before_mend)
     : node_(node),
       anchor_edits_(node),
       resend_pacer_(kResendBytesPerS, kResendBurst),
       now_utime_(now_utime) {
-  journal_ = std::make_unique<Journal>(
-      journal_path, [this](const std::string& channel, Bytes data, const JournalPlace& place) {
-        return LoadEvent(channel, data, place);
-      });
+  journal_ = std::make_unique<Journal>(journal_path, std::bind_front(&Archive::LoadEvent, this),
+                                       before_mend);
   replication_.emplace(replicated, journal_->size());
   const JournalMend& mend = journal_->mend();
   node_.Set("journal_bytes_torn", mend.torn_bytes);

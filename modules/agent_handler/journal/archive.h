@@ -11,6 +11,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -33,8 +34,10 @@ namespace pangea {
 class Archive {
  public:
   // Reads the journal; throws std::runtime_error if it cannot be used. `now_utime`: wall clock.
-  // `replicated`: only what other hosts also have counts as kept (replication.h).
-  Archive(Node& node, const std::string& journal_path, int64_t now_utime, bool replicated = false);
+  // `replicated`: only what other hosts also have counts as kept (replication.h). `before_mend`:
+  // as for Journal.
+  Archive(Node& node, const std::string& journal_path, int64_t now_utime, bool replicated = false,
+          const std::function<void()>& before_mend = nullptr);
 
   // Monotonic and wall clock; set them before the other calls.
   void set_now_us(int64_t steady_us) { now_us_ = steady_us; }

@@ -44,7 +44,9 @@ int64_t SizeOf(const std::vector<DamagedPart>& parts) {
 
 }  // namespace
 
-Journal::Journal(const std::string& path, const Visitor& visitor) : path_(path) {
+Journal::Journal(const std::string& path, const Visitor& visitor,
+                 const std::function<void()>& before_mend)
+    : path_(path) {
   fd_ = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
   if (fd_ < 0) {
     throw std::runtime_error(
@@ -55,7 +57,7 @@ Journal::Journal(const std::string& path, const Visitor& visitor) : path_(path) 
     if (flock(fd_, LOCK_EX | LOCK_NB) != 0) {
       throw std::runtime_error(fmt::format("the journal '{}' is in use by another process", path));
     }
-    Load(visitor);
+    Load(visitor, before_mend);
   } catch (...) {
     close(fd_);
     throw;
@@ -68,7 +70,7 @@ Journal::~Journal() {
   close(fd_);
 }
 
-void Journal::Load(const Visitor& visitor) {
+void Journal::Load(const Visitor& visitor, const std::function<void()>& before_mend) {
   std::vector<DamagedPart> parts;
   try {
     parts = Scan(visitor);
@@ -82,7 +84,7 @@ void Journal::Load(const Visitor& visitor) {
                     "move it away, and agents send again what they have",
                     path_));
   }
-  mend_ = MendJournal(path_, fd_, std::move(parts), &synced_bytes_);
+  mend_ = MendJournal(path_, fd_, std::move(parts), &synced_bytes_, before_mend);
 }
 
 // Reads the file, gives its events to the visitor, and returns the parts that are no valid events.

@@ -40,8 +40,10 @@ class Journal {
       std::function<bool(const std::string& channel, Bytes data, const JournalPlace& place)>;
 
   // Opens or creates the journal. Throws std::runtime_error if it cannot be opened, is in use by
-  // another process, is not a log, or its damaged parts cannot be copied.
-  Journal(const std::string& path, const Visitor& visitor);
+  // another process, is not a log, or its damaged parts cannot be copied. `before_mend` is called
+  // before damage is repaired, which the next opening does not see any more.
+  Journal(const std::string& path, const Visitor& visitor,
+          const std::function<void()>& before_mend = nullptr);
   ~Journal();
   Journal(const Journal&) = delete;
   Journal& operator=(const Journal&) = delete;
@@ -64,7 +66,7 @@ class Journal {
   const JournalMend& mend() const { return mend_; }
 
  private:
-  void Load(const Visitor& visitor);
+  void Load(const Visitor& visitor, const std::function<void()>& before_mend);
   std::vector<DamagedPart> Scan(const Visitor& visitor);
   bool Take(const CheckedScan::Piece& piece, const Visitor& visitor);
   void Note(int64_t number, int64_t utime, uint32_t crc32);

@@ -80,7 +80,7 @@ std::string JournalMend::Said(const std::string& journal) const {
 }
 
 JournalMend MendJournal(const std::string& path, int fd, std::vector<DamagedPart> parts,
-                        int64_t* file_bytes) {
+                        int64_t* file_bytes, const std::function<void()>& before_mend) {
   std::erase_if(parts, [&](const DamagedPart& part) {
     return part.range.end < *file_bytes && IsFilled(fd, part);
   });
@@ -95,6 +95,9 @@ JournalMend MendJournal(const std::string& path, int fd, std::vector<DamagedPart
     mend.damaged_parts += part.torn ? 0 : 1;
   }
   mend.copy = KeepDamaged(path, fd, ranges);
+  if (mend.damaged_bytes > 0 && before_mend) {
+    before_mend();
+  }
   int64_t end = *file_bytes;
   for (; !parts.empty() && parts.back().range.end == end; parts.pop_back()) {
     end = parts.back().range.begin;

@@ -3,6 +3,7 @@
 // Repairs a damaged journal, so that every LCM tool can read it to its end.
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -31,8 +32,9 @@ struct JournalMend {
 // First copies all parts to a file beside the journal, then repairs it: parts at its end are cut
 // off, the others become DAMAGED events. A part with fewer bytes than an event needs (which damage
 // in place never leaves) becomes zeros: they are not repaired again, but LCM's own reader stops
-// there. `file_bytes`: the file's length, updated to its new one. Throws std::runtime_error.
+// there. `file_bytes`: the file's length, updated to its new one. `before_mend` is called before
+// damage is repaired, but not for a torn end. Throws std::runtime_error.
 JournalMend MendJournal(const std::string& path, int fd, std::vector<DamagedPart> parts,
-                        int64_t* file_bytes);
+                        int64_t* file_bytes, const std::function<void()>& before_mend);
 
 }  // namespace pangea

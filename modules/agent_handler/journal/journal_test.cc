@@ -188,6 +188,25 @@ TEST_F(JournalTest, DamageCostsTheEventThatWasHitAlone) {
   }
 }
 
+TEST_F(JournalTest, SaysBeforeItMends) {
+  Write(3);
+  Contents damaged = ContentsOf(path);
+  damaged[45] ^= 1;
+  WriteContents(damaged);
+  std::vector<Contents> found;
+  const auto open = [&] {
+    Journal(
+        path, [](const std::string&, Bytes, const JournalPlace&) { return true; },
+        [&] { found.push_back(ContentsOf(path)); });
+  };
+  open();
+  EXPECT_EQ(found, std::vector<Contents>{damaged});
+  open();
+  std::filesystem::resize_file(path, std::filesystem::file_size(path) - 5);
+  open();
+  EXPECT_EQ(found.size(), 1u) << "a torn end is no damage";
+}
+
 TEST_F(JournalTest, WhatItsReaderCallsDamagedIsDamage) {
   {
     const auto journal = Open();
