@@ -76,15 +76,15 @@ void TakeOwner(const fs::path& from, const fs::path& to) {
 
 CompactSummary Compact(const Site& site, const std::optional<ThinJournal>& thin,
                        const std::function<void(CompactStep)>& on_step) {
-  const fs::path journal = site.journal();
-  const fs::path made = site.folder / "journal.lcm.compacting";
   const SiteLock lock(site);
-  if (!fs::exists(journal)) {
+  if (!fs::exists(site.journal())) {
     throw std::runtime_error(
-        fmt::format("{}: there is no journal yet, nothing to compact", journal.string()));
+        fmt::format("{}: there is no journal yet, nothing to compact", site.journal().string()));
   }
-  const Journal old = Lock(journal, site.checkpoints());
-  if (const std::string said = old.mend().Said(journal); !said.empty()) {
+  const fs::path journal = fs::canonical(site.journal());  // it may be a link to another disk
+  const fs::path made = journal.string() + ".compacting";
+  const Journal old = Lock(site.journal(), site.checkpoints());
+  if (const std::string said = old.mend().Said(site.journal()); !said.empty()) {
     std::cerr << said << "\n";
   }
   fs::remove(made);  // left over by a killed run
@@ -121,7 +121,7 @@ CompactSummary Compact(const Site& site, const std::optional<ThinJournal>& thin,
   fs::remove_all(site.checkpoints());  // they belong to the old journal
   fs::rename(made, journal);
   on_step(CompactStep::kSwapped);
-  SyncToDisk(site.folder);
+  SyncToDisk(journal.parent_path());
   on_step(CompactStep::kDone);
   return summary;
 }

@@ -87,6 +87,18 @@ TEST(Compact, CheckpointsGoWithTheDamageAlthoughItFails) {
   EXPECT_FALSE(fs::exists(site.checkpoints()));
 }
 
+// A journal on another disk stays there.
+TEST(Compact, FollowsALink) {
+  const fs::path folder = FreshFolder("compact_link");
+  const Site site = MakeSite(folder / "hall", Wasteful());
+  fs::rename(site.journal(), folder / "elsewhere.lcm");
+  fs::create_symlink(folder / "elsewhere.lcm", site.journal());
+  Compact(site);
+  EXPECT_TRUE(fs::is_symlink(site.journal()));
+  EXPECT_EQ(EventsOf(site), Lean());
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder), fs::directory_iterator()), 2);
+}
+
 TEST(Compact, RefusesWhileTheSiteOrItsJournalIsInUse) {
   const Site site = MakeSite(FreshFolder("compact_used") / "hall", WalksOf({1}));
   {
