@@ -30,7 +30,7 @@ constexpr size_t kMaxName = 100;
 // Whether a name is one of a site's files: a folder that becomes a site may have no others.
 bool IsOurs(const std::string& name) {
   return std::ranges::find(kFolders, name) != std::end(kFolders) || name == "lock" ||
-         name == "gateway" || name == "recordings" || name == "site.yaml" ||
+         name == "checkpoint" || name == "gateway" || name == "recordings" || name == "site.yaml" ||
          name == "site.yaml.new" || name.starts_with("journal.lcm");
 }
 
