@@ -83,6 +83,7 @@ TEST_P(BackupTest, BringsKeysIfWantedReadableByTheirOwnerAlone) {
   EXPECT_EQ(fs::status(key).permissions(), fs::perms::owner_read | fs::perms::owner_write);
   EXPECT_EQ(fs::status(key.parent_path()).permissions(), fs::perms::owner_all);
   EXPECT_EQ(ReadTextFile(folder / "again" / "gateway" / "ca.key"), "its key");
+  EXPECT_EQ(fs::status(folder / "again" / "gateway").permissions(), fs::perms::owner_all);
   EXPECT_EQ(ReadTextFile(folder / "again" / "gateway" / "ca.pem"), "authority");
   EXPECT_FALSE(fs::exists(folder / "again" / "gateway" / "invites")) << "a code is good once";
 }

@@ -81,7 +81,11 @@ void WriteSite(const Site& site) {
   for (const char* name : kFolders) {
     fs::create_directories(site.folder / name);
   }
-  fs::permissions(site.keys(), fs::perms::owner_all);
+  for (const fs::path& secret : {site.keys(), site.gateway()}) {
+    if (fs::exists(secret)) {
+      fs::permissions(secret, fs::perms::owner_all);
+    }
+  }
   SiteDescription description = site.description;
   YamlOptions yaml;
   description.Visit(yaml);
