@@ -174,8 +174,10 @@ bool Spool::Write(const KeyframeId& id, Bytes data, int64_t utime) {
   const Place place{newest_, segment.bytes, static_cast<int32_t>(bytes.size()),
                     EventChecksum(bytes)};
   AppendChecksumsEvent({next_event_, {place.crc32}}, utime, &bytes);
-  // If the disk fails in the middle, the next keyframe overwrites the part that was written.
   if (!WriteFully(fd_, segment.bytes, bytes.data(), bytes.size())) {
+    // The next event may be shorter than the part that was written, whose rest would be damage. If
+    // it cannot be cut off, that is all it is.
+    [[maybe_unused]] const int ignored = ftruncate(fd_, segment.bytes);
     return false;
   }
   places_[id] = place;

@@ -11,6 +11,7 @@
 #include <random>
 
 #include "messages/testing/test_keyframes.h"
+#include "uplink/thin.h"
 
 namespace pangea {
 namespace {
@@ -275,6 +276,27 @@ TEST_F(SpoolTest, ADiskThatRefusesHeals) {
   EXPECT_FALSE(taken);
   EXPECT_TRUE(Add(&spool, 2));
   EXPECT_EQ(spool.Read({kMap, 2}), EncodeTestKeyframe({kMap, 2}));
+  EXPECT_EQ(spool.Kept().size(), 2u);
+}
+
+// The part of an event that a full disk took was longer than the event after it.
+TEST_F(SpoolTest, AFullDiskIsNoDamage) {
+  std::signal(SIGXFSZ, SIG_IGN);
+  {
+    Spool spool(folder, 1, kLarge);
+    Add(&spool, 0);
+    rlimit limit{};
+    getrlimit(RLIMIT_FSIZE, &limit);
+    const rlimit full{static_cast<rlim_t>(spool.bytes() + 5000), limit.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &full);
+    EXPECT_FALSE(Add(&spool, 1));
+    const KeyframeId next{kMap, 2};
+    const bool taken = spool.Add(next, EncodeMessage(ToMessage(Bare(TestKeyframe(next)))), 2);
+    setrlimit(RLIMIT_FSIZE, &limit);
+    EXPECT_TRUE(taken);
+  }
+  const Spool spool(folder, 1, kLarge);
+  EXPECT_EQ(spool.num_damaged(), 0);
   EXPECT_EQ(spool.Kept().size(), 2u);
 }
 
