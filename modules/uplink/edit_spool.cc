@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <iostream>
+#include <stdexcept>
 #include <system_error>
 #include <utility>
 
@@ -22,6 +23,7 @@ namespace fs = std::filesystem;
 
 constexpr char kEditPrefix[] = "anchor_";
 constexpr char kEditSuffix[] = ".lcm";
+constexpr char kMadeSuffix[] = ".lcm.new";  // of a file that is being written
 
 }  // namespace
 
@@ -35,10 +37,13 @@ fs::path EditSpool::File(const AnchorId& anchor) const {
 
 std::vector<AnchorEdit> EditSpool::TakeLeft() {
   std::map<AnchorId, AnchorEdit> left;
-  std::vector<fs::path> damaged;
+  std::vector<fs::path> damaged, made;
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder_, error)) {
     const std::string name = entry.path().filename().string();
+    if (name.starts_with(kEditPrefix) && name.ends_with(kMadeSuffix)) {
+      made.push_back(entry.path());  // by a run that was killed meanwhile
+    }
     if (!name.starts_with(kEditPrefix) || !name.ends_with(kEditSuffix)) {
       continue;
     }
@@ -56,6 +61,9 @@ std::vector<AnchorEdit> EditSpool::TakeLeft() {
     std::cerr << fmt::format("'{}' IS DAMAGED: an edit of an anchor is lost; kept as '{}'\n",
                              file.string(), kept);
   }
+  for (const fs::path& file : made) {
+    fs::remove(file, error);
+  }
   std::vector<AnchorEdit> edits;
   for (auto& [anchor, edit] : left) {
     edits.push_back(std::move(edit));
@@ -68,13 +76,17 @@ std::optional<AnchorEdit> EditSpool::Read(const fs::path& file) const {
   if (fd < 0) {
     return std::nullopt;
   }
-  CheckedScan scan(fd);
-  const CheckedScan::Piece* const piece = scan.Next();
   std::optional<AnchorEdit> edit;
-  anchor_edit_t message{};
-  if (piece != nullptr && piece->kind == LogPiece::Kind::kEvent && piece->channel == channel_ &&
-      DecodeMessage(piece->data, &message)) {
-    edit = Parse(message).value;
+  try {
+    CheckedScan scan(fd);
+    const CheckedScan::Piece* const piece = scan.Next();
+    anchor_edit_t message{};
+    if (piece != nullptr && piece->kind == LogPiece::Kind::kEvent && piece->channel == channel_ &&
+        DecodeMessage(piece->data, &message)) {
+      edit = Parse(message).value;
+    }
+  } catch (const std::runtime_error&) {
+    // The disk cannot read it: it counts as damaged.
   }
   close(fd);
   return edit;
@@ -94,7 +106,7 @@ bool EditSpool::Write(const AnchorEdit& edit) const {
   AppendLogEvent(0, edit.anchor.created_utime, channel_, message, &bytes);
   AppendChecksumsEvent({0, {EventChecksum(bytes)}}, edit.anchor.created_utime, &bytes);
   const fs::path file = File(edit.anchor);
-  const std::string made = file.string() + ".new";
+  const std::string made = fs::path(file).replace_extension(kMadeSuffix).string();
   const int fd = open(made.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
   if (fd < 0) {
     return false;

@@ -74,6 +74,17 @@ TEST_F(EditSpoolTest, DamageCostsOneEditAndIsKept) {
   EXPECT_EQ(std::distance(fs::directory_iterator(folder), fs::directory_iterator()), 2);
 }
 
+// Neither what a killed run was writing, nor what cannot be read, is in the way.
+TEST_F(EditSpoolTest, WhatAKilledRunLeftIsRemoved) {
+  EditSpool(folder, 1).Put(TestEdit(kA, 1, 1));
+  std::ofstream(folder / "anchor_1_2.lcm.new") << "a part";
+  fs::create_directories(folder / "anchor_1_3.lcm" / "kept");
+  EXPECT_EQ(Left(), (Revisions{{kA, 1}}));
+  EXPECT_FALSE(fs::exists(folder / "anchor_1_2.lcm.new"));
+  EXPECT_FALSE(fs::exists(folder / "anchor_1_3.lcm"));
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder), fs::directory_iterator()), 2);
+}
+
 TEST_F(EditSpoolTest, AFullDiskLeavesTheOneBefore) {
   EditSpool spool(folder, 1);
   spool.Put(TestEdit(kA, 1, 1));

@@ -124,7 +124,16 @@ void Spool::LoadFrom(int fd, int64_t number) {
   CheckedScan scan(fd);
   segments_.at(number).bytes = scan.file_bytes();
   bytes_ += scan.file_bytes();
-  while (const CheckedScan::Piece* piece = scan.Next()) {
+  // What the disk cannot read, and all behind it, is damage.
+  const auto next = [&]() -> const CheckedScan::Piece* {
+    try {
+      return scan.Next();
+    } catch (const std::runtime_error& error) {
+      NoteDamage(number, error.what());
+      return nullptr;
+    }
+  };
+  while (const CheckedScan::Piece* piece = next()) {
     if (piece->kind == LogPiece::Kind::kEvent) {
       LoadEvent(number, *piece);
     } else if (piece->kind == LogPiece::Kind::kDamage ||

@@ -300,6 +300,20 @@ TEST_F(SpoolTest, AFullDiskIsNoDamage) {
   EXPECT_EQ(spool.Kept().size(), 2u);
 }
 
+// A folder cannot be read, as a bad sector cannot.
+TEST_F(SpoolTest, AFileThatCannotBeReadIsDamageAndStays) {
+  {
+    Spool spool(folder, 1, kLarge);
+    Add(&spool, 0);
+  }
+  fs::create_directories(folder / "keyframes_000007.lcm" / "kept");
+  Spool spool(folder, 1, kLarge);
+  EXPECT_EQ(spool.num_damaged(), 1);
+  EXPECT_THAT(spool.Kept(), testing::ElementsAre(KeyframeId{kMap, 0}));
+  EXPECT_EQ(Files().size(), 2u);
+  EXPECT_TRUE(Add(&spool, 1));
+}
+
 // Its keyframes would go out under this agent's name, and never be taken.
 TEST_F(SpoolTest, AnotherAgentsIsRefusedAndStays) {
   const MapId other{2, 1000};
