@@ -190,6 +190,8 @@ int OpenUdpmSocket(const UdpmAddress& address, LcmBus::Fragments fragments) {
   if (address.recv_buf_size > 0) {
     ReserveReceiveBuffer(address.recv_buf_size, &socket);
   }
+  // Else it would also receive what is sent to other groups on this port.
+  socket.Set(IPPROTO_IP, IP_MULTICAST_ALL, 0, "one group alone");
   socket.Bind(address.port);
   ip_mreq membership{};
   membership.imr_multiaddr = address.group;

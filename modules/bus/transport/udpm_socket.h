@@ -1,8 +1,9 @@
 #pragma once
 
 // The receiving socket of an LCM multicast bus (udpm://). As LCM's, it is bound to the port at
-// every address, and is a member of the group on the interface of the multicast route. In addition
-// it has a packet filter in the kernel, set before it is bound:
+// every address, and is a member of the group on the interface of the multicast route. Unlike
+// LCM's, it receives no other group's datagrams on this port. In addition it has a packet filter in
+// the kernel, set before it is bound:
 // - With ttl=0, no message leaves this host, and the filter also drops all datagrams from other
 //   hosts, both multicast and unicast. Only datagrams over the loopback interface pass, and the
 //   host's own multicast, looped back.

@@ -84,6 +84,15 @@ TEST_F(UdpmTest, WhatIsRefusedShowsInTheStatus) {
   EXPECT_EQ(CounterOf(status, "lost_in_queue"), std::nullopt);
 }
 
+TEST_F(UdpmTest, AnotherGroupOnThePortIsAnotherBus) {
+  LcmBus bus(url), other("udpm://239.255.76.99" + url.substr(url.rfind(':')));
+  Listen(&bus);
+  other.Subscribe("B", [](const std::string&, Bytes) {});
+  other.Publish("A", std::vector<uint8_t>(1));
+  bus.Publish("A", std::vector<uint8_t>(2));
+  EXPECT_THAT(Heard(&bus), ElementsAre("A 2"));
+}
+
 TEST_F(UdpmTest, TheLinkTakesNoFragments) {
   LcmBus bus(url, LcmBus::Fragments::kRefused);
   Listen(&bus);
