@@ -76,6 +76,15 @@ class Python(unittest.TestCase):
             self.bus.publish(channel, data)
         self.assertEqual(next(receiving), sent)
 
+    def test_another_group_on_the_port_is_another_bus(self):
+        other = Bus(URL.replace("76.67", "76.99"))
+        receiving = self.receive("A", 1)
+        next(receiving)
+        other.publish("A", b"theirs")
+        self.bus.publish("A", b"ours")
+        self.assertEqual(next(receiving), [("A", b"ours")])
+        other.close()
+
     def test_what_does_not_decode_is_counted(self):
         receiving = self.receive("POSE_1", 1, pangea.pose_t)
         next(receiving)

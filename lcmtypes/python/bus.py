@@ -196,6 +196,8 @@ def _receiving_socket(group, port, buffer_bytes, host_only):
         if given < buffer_bytes:
             print(f"bus: the kernel gives a receive buffer of {given // 1000} kB, not {buffer_bytes // 1000} kB: bursts are lost; "
                   f"sysctl -w net.core.rmem_max={buffer_bytes}", file=sys.stderr)
+    ip_multicast_all = 49  # else it would also receive what is sent to other groups on this port
+    receiver.setsockopt(socket.IPPROTO_IP, ip_multicast_all, 0)
     receiver.bind(("", port))
     receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, socket.inet_aton(group) + b"\0\0\0\0")
     return receiver
