@@ -10,6 +10,9 @@ namespace {
 
 bool is_on = false;
 
+// Unlike fmt::print, this does not throw when the log's disk is full.
+void Write(const std::string& line) { std::fputs(line.c_str(), stderr); }
+
 std::string WithoutNumbers(const std::string& text) {
   std::string rest;
   for (const char c : text) {
@@ -24,12 +27,12 @@ std::string WithoutNumbers(const std::string& text) {
 
 void StartLog(const std::string& program, const std::string& with) {
   is_on = true;
-  fmt::print(stderr, "{}: started; {}\n", program, with);
+  Write(fmt::format("{}: started; {}\n", program, with));
 }
 
 void Log(const std::string& process, const std::string& line) {
   if (is_on) {
-    fmt::print(stderr, "{}: {}\n", process, line);
+    Write(fmt::format("{}: {}\n", process, line));
   }
 }
 

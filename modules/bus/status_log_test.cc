@@ -1,7 +1,9 @@
 #include "bus/status_log.h"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include "bus/node.h"
 
@@ -42,6 +44,18 @@ TEST(StatusLog, TellsStatesAndEachReasonOnceAfterTheStart) {
             "pangea-test: started; bus memq://\n"
             "test: the first refused: image: no CAMERA yet\n"
             "test: works\n");
+}
+
+// The disk that is full may be that of the log: the process must go on.
+TEST(StatusLogDeathTest, AFullDiskIsNoEnd) {
+  EXPECT_EXIT(
+      {
+        dup2(open("/dev/full", O_WRONLY), STDERR_FILENO);
+        StartLog("pangea-test", "bus memq://");
+        Log("test", "THE DISK REFUSES WRITES");
+        _exit(0);
+      },
+      testing::ExitedWithCode(0), "");
 }
 
 }  // namespace
