@@ -172,6 +172,16 @@ TEST_F(DamagedLog, AReplayNamesTheDamageThatTookKeyframes) {
                     HasSubstr("block.lcm: 1 damaged place")));
 }
 
+TEST_F(DamagedLog, EveryCommandOnItsSiteSaysIt) {
+  ASSERT_EQ(Run("pangea-site create hall && cp bit.lcm hall/journal.lcm").exit_code, 0);
+  for (const char* command : {"info hall", "backup hall copy", "restore copy again",
+                              "export hall --out of_hall", "compact hall"}) {
+    const Outcome outcome = Run(fmt::format("pangea-site {}", command));
+    EXPECT_EQ(outcome.exit_code, kExitLost) << command << ": " << outcome.output;
+  }
+  EXPECT_EQ(Run("pangea-site info hall").exit_code, 0);
+}
+
 TEST_F(DamagedLog, ThePlayerAndTheViewerSayIt) {
   Outcome outcome =
       Run("timeout -s INT 20 pangea-keyframe-player --agent 1 --keyframes bit.lcm --bus memq:// "

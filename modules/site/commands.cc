@@ -24,6 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Arguments {
+  bool* lost = nullptr;  // as in commands.h
   std::string site, other, out, name, bus, link;
   bool with_keys = false;
   bool now = false;
@@ -33,8 +34,9 @@ using Shared = std::shared_ptr<Arguments>;
 
 double Megabytes(int64_t bytes) { return 1e-6 * static_cast<double>(bytes); }
 
-void NoteLoss(const fs::path& of, int64_t bytes) {
+void NoteLoss(const fs::path& of, int64_t bytes, const Arguments& arguments) {
   if (bytes > 0) {
+    *arguments.lost = true;
     std::cerr << fmt::format(
         "pangea-site: {}: {} bytes of it are damaged and lost; all else is there\n", of.string(),
         bytes);
@@ -78,7 +80,7 @@ void RunBackup(const Arguments& arguments) {
       "same{}\n",
       arguments.out, Megabytes(summary.journal_bytes), summary.events, Megabytes(summary.bytes),
       arguments.with_keys ? "; it holds the agents' keys: keep it safe" : "");
-  NoteLoss(arguments.site, summary.lost_bytes);
+  NoteLoss(arguments.site, summary.lost_bytes, arguments);
 }
 
 void RunRestore(const Arguments& arguments) {
@@ -86,7 +88,7 @@ void RunRestore(const Arguments& arguments) {
   std::cout << fmt::format("{}: {:.1f} MB of journal, {} events\n", arguments.site,
                            Megabytes(summary.journal_bytes), summary.events);
   NoteNoKeys(ReadSite(arguments.site));
-  NoteLoss(arguments.site, summary.lost_bytes);
+  NoteLoss(arguments.site, summary.lost_bytes, arguments);
 }
 
 void RunMerge(const Arguments& arguments) {
@@ -98,7 +100,13 @@ void RunMerge(const Arguments& arguments) {
       summary.anchor_edits, summary.maps_in_both);
   std::cout << "the server that starts on it looks for places that both have\n";
   NoteNoKeys(ReadSite(arguments.out));
-  NoteLoss(arguments.out, summary.bytes_lost);
+  NoteLoss(arguments.out, summary.bytes_lost, arguments);
+}
+
+void RunInfo(const Arguments& arguments) {
+  const SiteInfo info = ReadInfo(ReadSite(arguments.site));
+  std::cout << ToText(info);
+  *arguments.lost = !info.damage().whole();
 }
 
 ThinningOptions ReadThinningOptions(const Site& site) {
@@ -118,6 +126,7 @@ void RunCompact(const Arguments& arguments) {
     thin = {ReadThinningOptions(site), WallUtime()};
   }
   const CompactSummary summary = Compact(site, thin);
+  *arguments.lost = summary.damaged;
   if (thin) {
     std::cout << fmt::format(
         "{}: {} keyframes go, of places that newer ones show; {} constraints take the place of "
@@ -163,7 +172,7 @@ void AddReading(CLI::App& app, const Shared& arguments, LogReadings* readings) {
   CLI::App* info = AddSiteCommand(
       app, "info", "What is in a site: keyframes, maps, anchors, damage; a server may run",
       arguments);
-  info->callback([arguments] { std::cout << ToText(ReadInfo(ReadSite(arguments->site))); });
+  info->callback([arguments] { RunInfo(*arguments); });
 
   CLI::App* out = AddSiteCommand(app, "export",
                                  "Trajectories (*.tum), map points (map.ply) and anchors "
@@ -232,8 +241,9 @@ void AddChanging(CLI::App& app, const Shared& arguments) {
 
 }  // namespace
 
-void AddCommands(CLI::App& app, LogReadings* readings) {
+void AddCommands(CLI::App& app, LogReadings* readings, bool* lost) {
   const auto arguments = std::make_shared<Arguments>();
+  arguments->lost = lost;
   AddReading(app, arguments, readings);
   AddMaking(app, arguments);
   AddChanging(app, arguments);

@@ -9,7 +9,7 @@
 namespace pangea::site {
 
 // Adds the sub-commands to the app; the given one runs during parsing. `readings`: receives the
-// damage of the logs that were read.
-void AddCommands(CLI::App& app, LogReadings* readings);
+// damage of the logs that were read. `lost`: set to true after damage that the command itself told.
+void AddCommands(CLI::App& app, LogReadings* readings, bool* lost);
 
 }  // namespace pangea::site

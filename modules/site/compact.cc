@@ -89,6 +89,7 @@ CompactSummary Compact(const Site& site, const std::optional<ThinJournal>& thin,
   }
   fs::remove(made);  // left over by a killed run
   CompactSummary summary;
+  summary.damaged = old.mend().damaged_bytes > 0;
   summary.bytes_before = static_cast<int64_t>(fs::file_size(journal));
   on_step(CompactStep::kRead);
   const JournalContents contents = ReadContents(journal);

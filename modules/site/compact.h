@@ -21,6 +21,7 @@ namespace pangea::site {
 enum class CompactStep : uint8_t { kRead, kWrite, kWritten, kCompared, kSwapped, kDone };
 
 struct CompactSummary {
+  bool damaged = false;  // the old journal; a copy of the damage is kept beside it
   int64_t bytes_before = 0, bytes_after = 0;
   int64_t events_before = 0, events_after = 0;
   int64_t keyframes_gone = 0, constraints_derived = 0;  // only with thinning

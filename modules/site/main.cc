@@ -11,7 +11,9 @@ int main(int argc, char** argv) {
       "Exit code: 0; 1 when something could not be done; 3 when something of a journal is lost (it "
       "is damaged): then all is of what could be read; above 100 for a wrong command line.");
   pangea::LogReadings readings;
-  pangea::site::AddCommands(app, &readings);
-  const int exit_code = pangea::RunSubcommand(app, argc, argv);
-  return pangea::TellLosses("pangea-site", readings, exit_code);
+  bool lost = false;
+  pangea::site::AddCommands(app, &readings, &lost);
+  const int exit_code =
+      pangea::TellLosses("pangea-site", readings, pangea::RunSubcommand(app, argc, argv));
+  return exit_code == 0 && lost ? pangea::kExitLost : exit_code;
 }

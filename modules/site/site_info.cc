@@ -95,13 +95,9 @@ std::string UseOf(const std::optional<int>& user) {
   return user ? fmt::format("in use by process {}", *user) : "not in use";
 }
 
-// If a server runs, an incomplete last event is no damage: it is being written.
 std::string DamageOf(const SiteInfo& info) {
-  LogReading reading = info.reading;
-  if (info.user) {
-    reading.torn_bytes = 0;
-  }
-  return reading.whole() ? "none" : DescribeLoss(reading);
+  const LogReading damage = info.damage();
+  return damage.whole() ? "none" : DescribeLoss(damage);
 }
 
 std::string Missing(const std::set<int32_t>& seqs) {
@@ -131,6 +127,12 @@ std::map<std::string, std::string> ReadCheckpoints(const Site& site) {
 }
 
 }  // namespace
+
+LogReading SiteInfo::damage() const {
+  LogReading damage = reading;
+  damage.torn_bytes = user ? 0 : damage.torn_bytes;
+  return damage;
+}
 
 SiteInfo ReadInfo(const Site& site) {
   SiteInfo info;

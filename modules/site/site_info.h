@@ -27,6 +27,8 @@ struct SiteInfo {
   int64_t anchors = 0;                             // not deleted
   std::optional<int64_t> first_utime, last_utime;  // of the journal's events, wall clock
   LogReading reading;
+  // `reading`, but while a server runs, an incomplete last event is no damage: it is being written.
+  LogReading damage() const;
   std::map<std::string, std::string> checkpoints;  // by process: what it covers, for people
 };
 
