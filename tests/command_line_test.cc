@@ -121,6 +121,11 @@ TEST(Output, AFullDiskIsSaid) {
     EXPECT_EQ(outcome.exit_code, 1) << command;
     EXPECT_THAT(outcome.output, HasSubstr("pangea-log: the output cannot be written")) << command;
   }
+  for (const char* program : {"pangea-uplink", "pangea-agent-handler", "pangea-fusion"}) {
+    const Outcome outcome = RunCommand(fmt::format("{} --print-options >/dev/full", program));
+    EXPECT_EQ(outcome.exit_code, 1) << program;
+    EXPECT_THAT(outcome.output, HasSubstr("the output cannot be written")) << program;
+  }
 }
 
 TEST(Numbers, AreFinite) {

@@ -1,6 +1,7 @@
 #include "options/options_arguments.h"
 
 #include <iostream>
+#include <stdexcept>
 
 namespace pangea {
 
@@ -19,7 +20,10 @@ void OptionsArguments::Read(YamlOptions* yaml) const {
 bool OptionsArguments::Printed(const YamlOptions& yaml) const {
   if (print_) {
     const std::string text = yaml.Print();
-    std::cout << (text.find_first_not_of('\n') == std::string::npos ? "# no options\n" : text);
+    const bool has_none = text.find_first_not_of('\n') == std::string::npos;
+    if (!(std::cout << (has_none ? "# no options\n" : text) << std::flush)) {
+      throw std::runtime_error("--print-options: the output cannot be written (disk full?)");
+    }
   }
   return print_;
 }

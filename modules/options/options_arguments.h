@@ -17,6 +17,7 @@ class OptionsArguments {
   // Reads the file into `yaml` if one was given. Throws std::runtime_error.
   void Read(YamlOptions* yaml) const;
   // If --print-options was given, prints the options and returns true: the program should then end.
+  // Throws std::runtime_error if they cannot be printed.
   bool Printed(const YamlOptions& yaml) const;
   // Where the options come from, for people; for example "options as compiled in".
   std::string Source() const;
