@@ -67,9 +67,10 @@ bool OutputIsWritten(const std::string& program) {
 
 void RequireTwoUrls(const std::string& option, const std::string& url,
                     const std::string& other_option, const std::string& other_url) {
-  if (url == other_url) {
-    throw std::runtime_error(fmt::format("{} and {} are both {}: give two LCM URLs that differ",
-                                         option, other_option, url));
+  if (url.substr(0, url.find('?')) == other_url.substr(0, other_url.find('?'))) {
+    throw std::runtime_error(
+        fmt::format("{} and {} are both {}: give two LCM URLs that differ before the '?'", option,
+                    other_option, url));
   }
 }
 

@@ -47,8 +47,10 @@ void CheckDescription(const fs::path& file, const SiteDescription& description) 
       std::ranges::any_of(name, [](unsigned char c) { return c < 0x20 || c == 0x7f; })) {
     refuse(fmt::format("name: give 1 to {} printable bytes", kMaxName));
   }
-  if (description.bus.empty() || description.link.empty() || description.bus == description.link) {
-    refuse("bus, link: give two LCM URLs that differ");
+  const auto address = [](const std::string& url) { return url.substr(0, url.find('?')); };
+  if (description.bus.empty() || description.link.empty() ||
+      address(description.bus) == address(description.link)) {
+    refuse("bus, link: give two LCM URLs that differ before the '?'");
   }
   for (const auto& [key, url] : {std::pair("bus", description.bus), {"link", description.link}}) {
     if (const std::string why = WhyNoBus(url); !why.empty()) {

@@ -64,6 +64,9 @@ TEST(Site, NamesFileAndFieldOfWhatIsWrong) {
   EXPECT_THAT(refused("format: 1\nname: \"\"\n" + rest), HasSubstr("site.yaml: name: give 1 to"));
   EXPECT_THAT(refused("format: 1\nname: x\ncreated: now\nbus: a\nlink: a\n"),
               HasSubstr("two LCM URLs that differ"));
+  EXPECT_THAT(
+      refused("format: 1\nname: x\ncreated: now\nbus: udpm://?ttl=0\nlink: udpm://?ttl=1\n"),
+      HasSubstr("two LCM URLs that differ"));
   EXPECT_THAT(refused("format: 1\nname: x\ncreated: now\nbus: foo\nlink: udpm://\n"),
               HasSubstr("site.yaml: bus: 'foo' is no LCM URL"));
   EXPECT_THAT(refused("format: 1\nname: x\ncreated: now\nbus: tcpq://a:1\nlink: udpm://x:y\n"),
