@@ -12,7 +12,6 @@
 
 #include "files/progress.h"
 #include "log_file/log_reader.h"
-#include "log_file/log_writer.h"
 #include "log_tools/message_fields.h"
 
 namespace pangea::session {
@@ -121,33 +120,43 @@ void ListEvents(const std::string& log, const LogCut& cut, ListAs as, std::ostre
   }
 }
 
-void CheckNew(const std::string& path) {
-  if (std::filesystem::exists(path)) {
+NewLog::NewLog(std::string path) : path_(std::move(path)) {
+  if (std::filesystem::exists(path_)) {
     throw std::runtime_error(
-        fmt::format("{}: exists; give another name, nothing is overwritten", path));
+        fmt::format("{}: exists; give another name, nothing is overwritten", path_));
   }
+}
+
+NewLog::~NewLog() {
+  if (writer_ && !kept_) {
+    std::error_code ignored;
+    std::filesystem::remove(path_, ignored);
+  }
+}
+
+void NewLog::Write(int64_t utime, const std::string& channel, Bytes data) {
+  if (!writer_) {
+    writer_.emplace(path_);
+  }
+  writer_->Write(utime, channel, data);
 }
 
 int64_t CutLog(const std::string& log, const LogCut& cut, const std::string& out,
                LogReadings* readings) {
-  CheckNew(out);
-  // Created with the first event: an empty file would not be a log
-  std::optional<LogFileWriter> writer;
+  NewLog made(out);
   ReadCut(log, cut, readings, WhileReading::kTellProgress, [&](const LogEvent& event, double) {
-    if (!writer) {
-      writer.emplace(out);
-    }
-    writer->Write(event.utime, event.channel, event.data);
+    made.Write(event.utime, event.channel, event.data);
   });
-  if (!writer) {
-    ThrowEmpty(log, cut);
+  if (made.count() == 0) {
+    ThrowEmpty(log, cut);  // an empty file would not be a log
   }
-  return writer->count();
+  made.Keep();
+  return made.count();
 }
 
 int64_t MergeLogs(const std::vector<std::string>& logs, const std::string& out,
                   LogReadings* readings) {
-  CheckNew(out);
+  NewLog made(out);
   std::vector<Place> places;
   for (size_t log = 0; log < logs.size(); ++log) {
     size_t event = 0;
@@ -159,22 +168,25 @@ int64_t MergeLogs(const std::vector<std::string>& logs, const std::string& out,
     };
     ReadLog(logs[log], note, readings);
   }
+  if (places.empty()) {
+    throw std::runtime_error(fmt::format("{}: there is no event to write", out));
+  }
   std::ranges::stable_sort(places, {}, &Place::utime);
   std::deque<LogReader> files;
   for (const std::string& log : logs) {
     files.emplace_back(log);
   }
-  LogFileWriter writer(out);  // after all have been read: one that is no log leaves no file
   Progress progress("writing " + out);
   for (const Place& place : places) {
-    progress.Update(writer.count(), std::ssize(places), "events");
+    progress.Update(made.count(), std::ssize(places), "events");
     const LogEvent* event = files[place.log].Next();
     if (event == nullptr) {
       throw std::runtime_error(fmt::format("{}: changed while it was read", logs[place.log]));
     }
-    writer.Write(event->utime, event->channel, event->data);
+    made.Write(event->utime, event->channel, event->data);
   }
-  return writer.count();
+  made.Keep();
+  return made.count();
 }
 
 }  // namespace pangea::session

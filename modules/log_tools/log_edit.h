@@ -6,11 +6,13 @@
 
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <ostream>
 #include <string>
 #include <vector>
 
 #include "log_file/log_reading.h"
+#include "log_file/log_writer.h"
 
 namespace pangea::session {
 
@@ -30,8 +32,26 @@ enum class ListAs : uint8_t {
 void ListEvents(const std::string& log, const LogCut& cut, ListAs as, std::ostream& out,
                 LogReadings* readings = nullptr);
 
-// Throws std::runtime_error if the file exists: nothing is overwritten.
-void CheckNew(const std::string& path);
+// A new log. It is removed again unless Keep is called: a part of a log must not pass for the
+// whole.
+class NewLog {
+ public:
+  // Throws std::runtime_error if the file exists: nothing is overwritten.
+  explicit NewLog(std::string path);
+  ~NewLog();
+  NewLog(const NewLog&) = delete;
+  NewLog& operator=(const NewLog&) = delete;
+
+  // The file is made when it is first written to. Throws std::runtime_error.
+  void Write(int64_t utime, const std::string& channel, Bytes data);
+  void Keep() { kept_ = true; }
+  int64_t count() const { return writer_ ? writer_->count() : 0; }
+
+ private:
+  const std::string path_;
+  std::optional<LogFileWriter> writer_;
+  bool kept_ = false;
+};
 
 // Both return the number of events written. They throw std::runtime_error if a log cannot be read,
 // the output exists or cannot be written, the regular expression is invalid, or the cut has no

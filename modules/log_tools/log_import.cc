@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "log_file/log_reader.h"
-#include "log_file/log_writer.h"
 #include "log_tools/log_edit.h"
 #include "log_tools/log_export.h"
 #include "messages/channels.h"
@@ -79,17 +78,17 @@ int64_t ImportG2o(const std::string& log, const std::string& g2o, const std::str
   const Graph solved = ReadG2o(g2o, messages_checks::kMaxDistance);
   CheckVertices(GraphOf(log, readings), solved, g2o);
   const std::vector<map_state_t> chunks = Chunks(ReadServerLog(log, readings), solved, g2o);
-  CheckNew(out);
-  LogFileWriter writer(out);
+  NewLog made(out);
   int64_t latest = 0;
   const auto copy = [&](const LogEvent& event) {
     latest = std::max(latest, event.utime);
-    writer.Write(event.utime, event.channel, event.data);
+    made.Write(event.utime, event.channel, event.data);
   };
   ReadLog(log, copy, readings);
   for (const map_state_t& chunk : chunks) {
-    writer.Write(++latest, std::string(channels::kMapState), EncodeMessage(chunk));
+    made.Write(++latest, std::string(channels::kMapState), EncodeMessage(chunk));
   }
+  made.Keep();
   return std::ssize(solved.vertices);
 }
 

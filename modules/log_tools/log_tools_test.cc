@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <Eigen/Dense>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -371,6 +373,19 @@ TEST(Explanation, IsToldWithoutAnInlier) {
   const std::string text = ToText(explanation);
   EXPECT_NE(text.find("0 of 2 inliers in the two keyframes"), std::string::npos) << text;
   EXPECT_NE(text.find("inliers miss by - px"), std::string::npos) << text;
+}
+
+// A part of a log must not pass for the whole.
+TEST_F(LogToolsTest, AFullDiskLeavesNoPartOfALog) {
+  std::signal(SIGXFSZ, SIG_IGN);
+  rlimit limit{};
+  getrlimit(RLIMIT_FSIZE, &limit);
+  const rlimit full{300'000, limit.rlim_max};
+  setrlimit(RLIMIT_FSIZE, &full);
+  EXPECT_THROW(CutLog(kSample, {}, Path("cut.lcm")), std::runtime_error);
+  EXPECT_THROW(MergeLogs({kSample, kSample}, Path("merged.lcm")), std::runtime_error);
+  setrlimit(RLIMIT_FSIZE, &limit);
+  EXPECT_TRUE(fs::is_empty(folder_));
 }
 
 }  // namespace
