@@ -9,7 +9,9 @@ namespace pangea {
 Refinement::Refinement(const MapState& refined) : revision_(refined.revision), maps_(refined.maps) {
   std::ranges::sort(maps_);
   for (const KeyframePose& keyframe : refined.keyframes) {
-    poses_[keyframe.id] = keyframe.T_map_body;
+    if (std::ranges::binary_search(maps_, keyframe.id.map)) {
+      poses_[keyframe.id] = keyframe.T_map_body;
+    }
   }
 }
 

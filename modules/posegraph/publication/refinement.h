@@ -26,7 +26,7 @@ class Refinement {
   int64_t revision() const { return revision_; }
   const std::vector<MapId>& maps() const { return maps_; }
   bool SharesMapWith(const Refinement& other) const;
-  // By (map, seq); in the refinement's own frame.
+  // By (map, seq), only of keyframes of `maps`; in the refinement's own frame.
   const std::map<KeyframeId, Rigid3>& poses() const { return poses_; }
 
  private:

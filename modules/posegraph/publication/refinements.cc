@@ -34,7 +34,8 @@ bool Refinements::Add(const MapState& refined, const GraphMaps& maps) {
   const auto as_new = [&](const Refinement& held) {
     return shares(held) && held.revision() >= refinement.revision();
   };
-  if (!std::ranges::all_of(refinement.maps(), known) || std::ranges::any_of(refinements_, as_new)) {
+  if (refinement.maps().empty() || !std::ranges::all_of(refinement.maps(), known) ||
+      std::ranges::any_of(refinements_, as_new)) {
     return false;
   }
   std::erase_if(refinements_, shares);

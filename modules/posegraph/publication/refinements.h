@@ -13,7 +13,8 @@ namespace pangea {
 
 class Refinements {
  public:
-  // False, and nothing changes, for a repeat, an older revision, or a refinement of an unknown map.
+  // False, and nothing changes, for a repeat, an older revision, or a refinement of no or an
+  // unknown map.
   bool Add(const MapState& refined, const GraphMaps& maps);
 
   // The published poses of each of the group's maps, by map number. A map without a refinement

@@ -52,5 +52,18 @@ TEST(Refinements, AreLaidOnTheSolutionWhereTheirMapsAreOneGroup) {
   EXPECT_LT((apart.at(1).T_map_body(2).t - Eigen::Vector3d(2, 0, 0)).norm(), 1e-12);
 }
 
+// Whoever made it: a bundle adjustment may be another program.
+TEST(Refinements, AKeyframeOfAMapThatItDoesNotNameIsLeftOut) {
+  const GraphMaps maps = MakeRows(2, 3);
+  MapState refined = Stretched({1, 2}, 4);
+  refined.maps = {RowId(1)};
+  Refinements refinements;
+  ASSERT_TRUE(refinements.Add(refined, maps));
+  const auto alone = refinements.Refine({0}, maps);
+  EXPECT_LT((alone.at(0).T_map_body(2).t - Eigen::Vector3d(3, 0, 0)).norm(), 1e-9);
+  refined.maps.clear();
+  EXPECT_FALSE(refinements.Add(refined, maps)) << "of no map";
+}
+
 }  // namespace
 }  // namespace pangea
