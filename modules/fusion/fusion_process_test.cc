@@ -243,6 +243,28 @@ TEST_F(VerificationProcesses, BesideVerifiedOnesACandidateIsRedundant) {
   EXPECT_EQ(constraints_[0].reason, kRedundant);
 }
 
+// While both run, neither process learns the other's results; so it does not after a restart, when
+// the journal has them all.
+TEST_F(VerificationProcesses, ResultsOfTheOtherKindDecideNothing) {
+  SendKeyframes(agent_c_, 0, 12);
+  Constraint known;
+  known.kind = PlaceKind::kIntra;
+  known.accepted = true;
+  known.covariance *= 0.02 * 0.02;
+  for (int i = 0; i < KnownConstraintOptions{}.min_nearby; ++i) {
+    known.from = agent_c_.keyframes[i / 2].id;
+    known.to = agent_c_.keyframes[7 + i % 2].id;
+    Retransmit(listener_, "fusion", std::string(channels::kConstraint), ToMessage(known));
+  }
+  bus_.Drain();
+  const PlaceMatch match{
+      agent_c_.keyframes[9].id, {{agent_c_.keyframes[0].id, PlaceKind::kInter, 0.5f, {}}}, {}};
+  PublishMessage(bus_, std::string(channels::kPlaceMatch), ToMessage(match));
+  bus_.Drain();
+  ASSERT_EQ(constraints_.size(), 1u);
+  EXPECT_NE(constraints_[0].reason, kRedundant);
+}
+
 // The first result of its map is pending: whether this one is redundant may depend on it.
 TEST_F(VerificationProcesses, ACandidateWaitsForThoseThatItRestsOn) {
   SendKeyframes(agent_m_, 0, 12);

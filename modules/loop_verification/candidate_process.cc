@@ -15,7 +15,7 @@
 namespace pangea {
 namespace {
 
-constexpr uint32_t kCheckpointFormat = 3;
+constexpr uint32_t kCheckpointFormat = 4;
 constexpr int64_t kSecond = 1'000'000;
 constexpr char kJournalOwner[] = "agent_handler";
 
@@ -47,8 +47,11 @@ CandidateProcess::CandidateProcess(Bus& bus, const std::string& name, PlaceKind 
                                   std::bind_front(&CandidateProcess::OnVerificationRequest, this));
 }
 
+// The journal also has the results of the other kind. While they run, neither process learns those
+// of the other.
 void CandidateProcess::OnFormerResult(const Constraint& result) {
-  if (verified_.insert(result.Id()).second) {
+  const bool of_the_other = result.kind != kind_ && result.kind != PlaceKind::kDerived;
+  if (!of_the_other && verified_.insert(result.Id()).second) {
     verifier_->NoteVerified(result);
   }
 }
