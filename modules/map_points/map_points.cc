@@ -27,6 +27,7 @@ constexpr double kMinSigma = 0.002;   // m, minimum of a published sigma
 constexpr double kMaxAxes_rad = 1.2;  // between two cameras' axes
 constexpr size_t kMinPoints = 8;      // in view, for a source to be used
 constexpr size_t kMaxSources = 12;    // considered for one message
+constexpr size_t kMaxNear = 500;      // keyframes looked at for one message; fewer than max_views
 // Landmarks are spread over the image: at most kPerCell per cell.
 constexpr int kColumns = 5, kRows = 4, kPerCell = 2;
 
@@ -82,23 +83,40 @@ MapPoints::Source MapPoints::Look(const KeyframeView& view, const Rigid3& T_map_
   return source;
 }
 
+std::vector<KeyframeId> MapPoints::Near(const AgentPose& agent, const PosedGroup& group,
+                                        const Outlook& outlook) const {
+  std::vector<std::pair<double, KeyframeId>> near;
+  for (const auto& [id, T_map_body] : group.T_map_body) {
+    const bool is_recent = id.map == agent.map && id.seq > outlook.newest_seq - kOwnRecent;
+    const double distance_m = (T_map_body.t - outlook.T_map_cam.t).norm();
+    if (!is_recent && distance_m <= kMaxDistance_m && refined_.contains(id)) {
+      near.emplace_back(distance_m, id);
+    }
+  }
+  if (near.size() > kMaxNear) {
+    std::ranges::nth_element(near, near.begin() + kMaxNear);
+    near.resize(kMaxNear);
+  }
+  std::vector<KeyframeId> ids;
+  for (const auto& [distance_m, id] : near) {
+    ids.push_back(id);
+  }
+  std::ranges::sort(ids);
+  return ids;
+}
+
 // Sorted by the number of points in view, largest first.
 std::vector<MapPoints::Source> MapPoints::SourcesFor(const AgentPose& agent,
                                                      const PosedGroup& group,
                                                      const Outlook& outlook) {
   const Vector3d axis = outlook.T_map_cam.q * Vector3d::UnitZ();
   std::vector<Source> sources;
-  for (const auto& [id, T_map_body] : group.T_map_body) {
-    const bool is_recent = id.map == agent.map && id.seq > outlook.newest_seq - kOwnRecent;
-    if (is_recent || (T_map_body.t - outlook.T_map_cam.t).norm() > kMaxDistance_m ||
-        !refined_.contains(id)) {
-      continue;
-    }
+  for (const KeyframeId& id : Near(agent, group, outlook)) {
     const auto view = store_.Find(id);
     if (view == nullptr) {
       continue;
     }
-    const Rigid3 T_map_cam = T_map_body * view->keyframe().camera.T_body_cam;
+    const Rigid3 T_map_cam = group.T_map_body.at(id) * view->keyframe().camera.T_body_cam;
     if (axis.dot(T_map_cam.q * Vector3d::UnitZ()) < std::cos(kMaxAxes_rad)) {
       continue;
     }

@@ -94,6 +94,10 @@ class MapPoints {
   class Selection;
 
   std::optional<Outlook> OutlookOf(const AgentPose& agent, const PosedGroup& group);
+  // The adjusted keyframes around the agent that are not recent ones of its own map, ascending. At
+  // most a bounded number, the nearest: each has to be read and projected.
+  std::vector<KeyframeId> Near(const AgentPose& agent, const PosedGroup& group,
+                               const Outlook& outlook) const;
   std::vector<Source> SourcesFor(const AgentPose& agent, const PosedGroup& group,
                                  const Outlook& outlook);
   Source Look(const KeyframeView& view, const Rigid3& T_map_cam, const Outlook& outlook) const;

@@ -112,6 +112,43 @@ TEST_F(MapPointsTest, TellsWhatTheAgentWillSee) {
   EXPECT_LE(ToMessage(*message).getEncodedSize(), 1200);
 }
 
+class CountingStore : public RecordStore {
+ public:
+  std::optional<int64_t> Append(std::span<const uint8_t> record) override {
+    records_.emplace_back(record.begin(), record.end());
+    return static_cast<int64_t>(records_.size()) - 1;
+  }
+  bool Read(int64_t offset, std::span<uint8_t> record) override {
+    ++num_reads;
+    std::ranges::copy(records_[offset], record.begin());
+    return true;
+  }
+  std::string problem() const override { return ""; }
+
+  int num_reads = 0;
+
+ private:
+  std::vector<std::vector<uint8_t>> records_;
+};
+
+// Hours in one room: a message must not take longer than the time until the next one.
+TEST_F(MapPointsTest, OnlyTheNearestOfVeryManyAreRead) {
+  for (int i = 40; i < 2000; ++i) {
+    Add({kOld, i}, {-0.001 * i, -8 + 0.4 * (i % 40), 0});
+  }
+  const auto records = std::make_shared<CountingStore>();
+  MapPoints points(records);
+  for (const Keyframe& keyframe : keyframes_) {
+    points.Take(keyframe);
+  }
+  points.Take(state_);
+  points.TakeRefined(state_);
+  const auto message = points.Choose(PoseAt(0));
+  ASSERT_TRUE(message);
+  EXPECT_GT(message->landmarks.size(), 10u);
+  EXPECT_LT(records->num_reads, 600);
+}
+
 TEST_F(MapPointsTest, DoesNotRepeatItselfAtOnce) {
   MapPoints points = Filled();
   points.TakeRefined(state_);
