@@ -156,6 +156,11 @@ std::vector<MapState> PoseGraph::States() const {
   return states;
 }
 
+double PoseGraph::LogScale(const MapId& map) const {
+  const std::optional<int> number = maps_.Number(map);
+  return number ? maps_[*number].log_scale : 0;
+}
+
 std::vector<int64_t> PoseGraph::InForce() const {
   std::vector<int64_t> ids;
   for (const Loop& loop : loops_) {

@@ -85,6 +85,8 @@ class PoseGraph {
   Counters counters() const;
   // Ids of the constraints in force after the last solves, ascending.
   std::vector<int64_t> InForce() const;
+  // One metre of the map's odometry is exp(LogScale) metres in the solution; 0 for a metric map.
+  double LogScale(const MapId& map) const;
   // The states that would be published now, one per group.
   std::vector<MapState> States() const;
 

@@ -11,34 +11,6 @@
 namespace pangea {
 namespace {
 
-// The keyframes of an odometry with wrong scale: one metre of it is exp(log_scale) true metres, and
-// its sigma of the scale is `sigma`.
-void Unscale(double log_scale, double sigma, SyntheticAgent* agent) {
-  const double longer = std::exp(-log_scale);
-  for (Keyframe& keyframe : agent->keyframes) {
-    keyframe.T_odom_body.t *= longer;
-    keyframe.scale_sigma = sigma;
-    if (keyframe.edge) {
-      keyframe.edge->T_from_this.t *= longer;
-      keyframe.edge->covariance.topRows<3>() *= longer;
-      keyframe.edge->covariance.leftCols<3>() *= longer;
-    }
-  }
-}
-
-// Constraints within the map are in its units; those between maps are metric, because verification
-// has accounted for the scales.
-void Unscale(double log_scale, const MapId& map, std::vector<Constraint>* constraints) {
-  const double longer = std::exp(-log_scale);
-  for (Constraint& constraint : *constraints) {
-    if (constraint.from.map == map && constraint.to.map == map) {
-      constraint.T_from_to.t *= longer;
-      constraint.covariance.topRows<3>() *= longer;
-      constraint.covariance.leftCols<3>() *= longer;
-    }
-  }
-}
-
 MapState OfMap(const MapState& state, const MapId& map) {
   MapState part = state;
   std::erase_if(part.keyframes, [&](const KeyframePose& pose) { return pose.id.map != map; });

@@ -1,6 +1,7 @@
 // Edges and constraints of the maps after Thinning, and the pose graph's solution for them.
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <utility>
 
@@ -92,6 +93,7 @@ Thinning::Solution Thinning::Solve(const ThinnedMaps& without) const {
     }
     for (const MapId& map : state.maps) {
       solution.group_of[map] = state.group;
+      solution.log_scale[map] = graph.LogScale(map);
     }
     for (const KeyframePose& pose : state.keyframes) {
       solution.T_map_body[pose.id] = pose.T_map_body;
@@ -144,7 +146,8 @@ NodeRemoval Thinning::Removed(const Solution& solution, const std::set<KeyframeI
 
 // Constraints between remaining keyframes, from the older map or keyframe to the newer one; the
 // smallest covariance first. Their relative poses are those of the solution, which includes all
-// measurements: so they never contradict each other.
+// measurements: so they never contradict each other. Those within a map are in the map's own units,
+// as the pose graph expects them.
 std::vector<Constraint> Thinning::BestKnownFirst(const Solution& solution,
                                                  const NodeRemoval& removed) const {
   std::map<MapId, size_t> age;
@@ -164,6 +167,9 @@ std::vector<Constraint> Thinning::BestKnownFirst(const Solution& solution,
       constraint.kind = PlaceKind::kDerived;
       constraint.accepted = true;
       constraint.T_from_to = solution.T_map_body.at(from).Inverse() * solution.T_map_body.at(to);
+      if (from.map == to.map) {
+        constraint.T_from_to.t *= std::exp(-solution.log_scale.at(from.map));
+      }
       constraint.covariance = factor.relative.covariance;
       constraint.num_inliers = factor.num_inliers;
       constraint.inlier_ratio = factor.inlier_ratio;

@@ -89,6 +89,7 @@ class Thinning {
   struct Solution {
     std::map<KeyframeId, Rigid3> T_map_body;
     std::map<MapId, MapId> group_of;
+    std::map<MapId, double> log_scale;
     std::set<int64_t> in_force;
     double odometry_scale = 1;  // factor on standard deviations
   };

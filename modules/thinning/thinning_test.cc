@@ -22,9 +22,10 @@ constexpr int kKeyframes = 50;
 class ThinningTest : public ::testing::Test {
  protected:
   ThinningTest() { Make(1); }
-  void Make(int seed) {
+  void Make(int seed, double step_m = 0.4) {
     SyntheticWorldOptions options;
     options.seed = seed;
+    options.step_m = step_m;
     constraints_.clear();
     options.num_agents = kVisits;
     options.num_keyframes = kKeyframes;
@@ -186,6 +187,29 @@ TEST_F(ThinningTest, DerivedConstraintsAreTrueToTheirCovariance) {
   // Below one: the poses use all measurements, the covariances only a tree of them.
   EXPECT_GT(nees, 0.1);
   EXPECT_LT(nees, 1.2);
+}
+
+// A constraint within a map that is not metric is in the map's own units, as its edges are.
+TEST_F(ThinningTest, DerivedConstraintsHaveTheUnitsOfTheirMap) {
+  constexpr double kLogScale = 0.2;
+  Make(1, 0.8);
+  for (size_t visit = 1; visit < world_.agents.size(); ++visit) {
+    Unscale(kLogScale, 0.2, &world_.agents[visit]);
+    Unscale(kLogScale, world_.agents[visit].map, &constraints_);
+  }
+  const ThinnedMaps thinned = MakeThinning().Thin(kNow);
+  double told = 0, truth = 0;
+  for (const Constraint& constraint : thinned.derived) {
+    if (constraint.from.map == constraint.to.map && constraint.from.map != world_.agents[0].map) {
+      told += constraint.T_from_to.t.norm();
+      truth += (world_.T_hall_body(constraint.from).t - world_.T_hall_body(constraint.to).t).norm();
+    }
+  }
+  ASSERT_GT(truth, 1);
+  EXPECT_NEAR(told / truth, std::exp(-kLogScale), 0.01);
+  const std::vector<MapState> states = States(thinned);
+  ASSERT_EQ(states.size(), 1u);
+  EXPECT_EQ(states[0].num_switched_off, 0);
 }
 
 TEST_F(ThinningTest, AKeyframeGetsOnlySoManyDerivedConstraints) {

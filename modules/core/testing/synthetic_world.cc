@@ -318,4 +318,28 @@ std::vector<KeyframePair> OverlappingPairs(const SyntheticWorld& world, double d
   return pairs;
 }
 
+void Unscale(double log_scale, double sigma, SyntheticAgent* agent) {
+  const double longer = std::exp(-log_scale);
+  for (Keyframe& keyframe : agent->keyframes) {
+    keyframe.T_odom_body.t *= longer;
+    keyframe.scale_sigma = sigma;
+    if (keyframe.edge) {
+      keyframe.edge->T_from_this.t *= longer;
+      keyframe.edge->covariance.topRows<3>() *= longer;
+      keyframe.edge->covariance.leftCols<3>() *= longer;
+    }
+  }
+}
+
+void Unscale(double log_scale, const MapId& map, std::vector<Constraint>* constraints) {
+  const double longer = std::exp(-log_scale);
+  for (Constraint& constraint : *constraints) {
+    if (constraint.from.map == map && constraint.to.map == map) {
+      constraint.T_from_to.t *= longer;
+      constraint.covariance.topRows<3>() *= longer;
+      constraint.covariance.leftCols<3>() *= longer;
+    }
+  }
+}
+
 }  // namespace pangea

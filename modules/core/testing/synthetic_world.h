@@ -100,4 +100,11 @@ struct KeyframePair {
 std::vector<KeyframePair> OverlappingPairs(const SyntheticWorld& world, double distance_m,
                                            int min_seq_gap);
 
+// Makes the agent's odometry one with a wrong scale: one metre of it is exp(log_scale) true metres,
+// and its sigma of the scale is `sigma`.
+void Unscale(double log_scale, double sigma, SyntheticAgent* agent);
+// The constraints for it: those within the map are in its units; those between maps are metric,
+// because verification has accounted for the scales.
+void Unscale(double log_scale, const MapId& map, std::vector<Constraint>* constraints);
+
 }  // namespace pangea
