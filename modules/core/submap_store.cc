@@ -121,9 +121,13 @@ void SubmapStore::Add(Keyframe keyframe) {
 }
 
 void SubmapStore::DropOne() {
-  views_.Erase(in_memory_.front());
-  keyframes_.erase(in_memory_.front());
+  const KeyframeId id = in_memory_.front();
+  views_.Erase(id);
+  keyframes_.erase(id);
   in_memory_.pop_front();
+  // Most often the one before it was dropped before.
+  const auto before = lost_.extract({id.map, id.seq - 1});
+  NoteLost(id.map, before.empty() ? id.seq : before.mapped(), id.seq);
   --counters_.in_memory;
   ++counters_.dropped;
 }

@@ -87,7 +87,7 @@ class SubmapStore {
   bool Restore(ByteReader* reader);
 
   // These keyframes are lost: nobody has them any more (HAVE names such gaps). From now on windows
-  // and chains count as complete without them.
+  // and chains count as complete without them. The same holds for a keyframe that was dropped.
   void NoteLost(const MapId& map, int32_t from_seq, int32_t to_seq);
 
   bool Contains(const KeyframeId& id) const { return keyframes_.contains(id); }

@@ -156,6 +156,21 @@ TEST(SubmapStore, WhatFindsNoRoomStaysInMemoryAndIsBoundedThere) {
   EXPECT_EQ(store.Find({kMap, 3}), nullptr);
 }
 
+// Nobody waits for what the store itself has dropped: it will not come again.
+TEST(SubmapStore, WhatWasDroppedIsLost) {
+  SubmapStore store({.max_in_memory = 3});
+  for (int seq = 0; seq < 7; ++seq) {
+    store.Add(MakeKeyframe(seq));
+  }
+  ASSERT_EQ(store.counters().dropped, 4);
+  EXPECT_TRUE(store.WindowIsComplete({kMap, 6}, 5));
+  EXPECT_EQ(store.WindowUpTo({kMap, 6}, 5).size(), 3u);
+  EXPECT_TRUE(store.WindowIsComplete({kMap, 2}, 5));
+  EXPECT_TRUE(store.WindowUpTo({kMap, 2}, 5).empty());
+  EXPECT_TRUE(store.ChainIsComplete({kMap, 1}, {kMap, 6}));
+  EXPECT_FALSE(store.WindowIsComplete({kMap, 7}, 5)) << "that one may still come";
+}
+
 TEST(SubmapStore, WhatCannotBeReadIsNotThere) {
   const auto records = std::make_shared<test::TestRecordStore>(100);
   SubmapStore store({.max_views = 1}, records);
