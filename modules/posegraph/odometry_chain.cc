@@ -38,9 +38,8 @@ bool OdometryChain::Add(const Keyframe& keyframe) {
   node.scene_odom = MiddleOfScene(keyframe);
   node.scale_sigma = keyframe.scale_sigma;
   if (!nodes_.empty()) {
-    const std::optional<int> from = keyframe.edge ? Find(keyframe.edge->from_seq) : std::nullopt;
-    if (from) {
-      JoinByEdge(*keyframe.edge, *from, &node);
+    if (keyframe.edge && keyframe.edge->from_seq == nodes_.back().seq) {
+      JoinByEdge(*keyframe.edge, &node);
     } else {
       Bridge(&node);
     }
@@ -62,20 +61,16 @@ bool OdometryChain::Restore(ByteReader* reader) {
   constexpr size_t kLeastBytes = 100;
   reader->Get(&num_bridged_);
   nodes_.resize(reader->GetCount(kLeastBytes));
-  int number = 0;
   for (Node& node : nodes_) {
     VisitParts(node, [reader](auto* part) { reader->Get(part); });
-    if (node.edge_from >= number++) {
-      return false;
-    }
   }
   return reader->ok();
 }
 
-void OdometryChain::JoinByEdge(const OdometryEdge& edge, int from, Node* node) const {
-  node->edge_from = from;
-  node->edge = MakeRelative4(edge.T_from_this, edge.covariance, nodes_[from].T_odom_body.q,
-                             nodes_[from].roll_pitch_covariance, node->T_odom_body.q);
+void OdometryChain::JoinByEdge(const OdometryEdge& edge, Node* node) const {
+  const Node& from = nodes_.back();
+  node->edge = MakeRelative4(edge.T_from_this, edge.covariance, from.T_odom_body.q,
+                             from.roll_pitch_covariance, node->T_odom_body.q);
 }
 
 void OdometryChain::Bridge(Node* node) {
@@ -87,7 +82,6 @@ void OdometryChain::Bridge(Node* node) {
     ++count;
   }
   const Node& from = nodes_.back();
-  node->edge_from = static_cast<int>(nodes_.size()) - 1;
   node->edge.t = node->T_odom_body.t - from.T_odom_body.t;
   node->edge.yaw = 0;
   // Errors of the missing steps add up; on average, the yaw error of a step acts on half of the
@@ -98,7 +92,7 @@ void OdometryChain::Bridge(Node* node) {
 }
 
 void OdometryChain::Accumulate(Node* node) const {
-  const Node& from = nodes_[node->edge_from];
+  const Node& from = nodes_.back();
   node->path_m = from.path_m + node->edge.t.norm();
   // The edge's error moves a point P by dt + z x (P - p_to) dyaw; here P = 0, the origin of odom.
   node->drift_sum = from.drift_sum + CovarianceAt(node->edge.covariance, -node->T_odom_body.t);

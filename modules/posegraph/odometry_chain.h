@@ -25,16 +25,15 @@ class OdometryChain {
     int64_t utime = 0;
     Rigid3 T_odom_body;
     Eigen::Matrix2d roll_pitch_covariance;
-    Eigen::Vector3d scene_odom;  // the point on the optical axis at the median depth
-    double scale_sigma = 0;      // Keyframe::scale_sigma
-    int edge_from = -1;          // index of the node where its odometry edge begins; -1: first node
-    Relative4 edge;
+    Eigen::Vector3d scene_odom;             // the point on the optical axis at the median depth
+    double scale_sigma = 0;                 // Keyframe::scale_sigma
+    Relative4 edge;                         // from the node before it; none in the first node
     double path_m = 0;                      // travelled since the map's first keyframe
     Matrix4d drift_sum = Matrix4d::Zero();  // of all edges up to this node, at the origin of odom
   };
 
-  // False if the keyframe is a repeat or older than the newest one. A keyframe without a usable
-  // edge is joined to its predecessor by a composite edge: the relative pose of their two odometry
+  // False if the keyframe is a repeat or older than the newest one. A keyframe without an edge from
+  // its predecessor is joined to it by a composite edge: the relative pose of their two odometry
   // poses, with the mean covariance of this map's recent edges, once per missing keyframe.
   bool Add(const Keyframe& keyframe);
 
@@ -55,7 +54,7 @@ class OdometryChain {
   double UnknownScale() const;  // sigma of the map's log-scale; 0: the map is metric
 
  private:
-  void JoinByEdge(const OdometryEdge& edge, int from, Node* node) const;
+  void JoinByEdge(const OdometryEdge& edge, Node* node) const;
   void Bridge(Node* node);
   void Accumulate(Node* node) const;
 
@@ -68,7 +67,6 @@ class OdometryChain {
     visit(&node.roll_pitch_covariance);
     visit(&node.scene_odom);
     visit(&node.scale_sigma);
-    visit(&node.edge_from);
     visit(&node.edge.t);
     visit(&node.edge.yaw);
     visit(&node.edge.covariance);

@@ -57,12 +57,9 @@ void GroupProblem::AddMaps() {
 void GroupProblem::AddOdometry(int number, const SolvedMap& solved) {
   const OdometryChain& chain = maps_[number].chain;
   for (int i = solved.first + 1; i <= solved.last; ++i) {
-    if (chain[i].edge_from >= solved.first) {
-      Relative4 edge = chain[i].edge;
-      edge.covariance *= odometry_variance_;
-      solver_.AddOdometry(solved.offset + chain[i].edge_from, solved.offset + i, edge,
-                          solved.scale);
-    }
+    Relative4 edge = chain[i].edge;
+    edge.covariance *= odometry_variance_;
+    solver_.AddOdometry(solved.offset + i - 1, solved.offset + i, edge, solved.scale);
   }
 }
 
