@@ -24,6 +24,11 @@ Eigen::Vector3d MiddleOfScene(const Keyframe& keyframe) {
   return keyframe.T_odom_cam() * Eigen::Vector3d(0, 0, depth);
 }
 
+// The errors of an edge's steps add up; on average, the yaw error of a step acts on half of them.
+Eigen::Vector3d Lever(const Relative4& edge, int32_t steps) {
+  return (steps > 1 ? 0.5 : 0.0) * edge.t;
+}
+
 }  // namespace
 
 bool OdometryChain::Add(const Keyframe& keyframe) {
@@ -76,18 +81,18 @@ void OdometryChain::JoinByEdge(const OdometryEdge& edge, Node* node) const {
 void OdometryChain::Bridge(Node* node) {
   constexpr size_t kUsual = 50;
   Matrix4d usual = Vector4d(1e-4, 1e-4, 1e-4, 1e-4).asDiagonal();
-  double count = 1;
+  double steps = 1;
   for (size_t i = nodes_.size(); i > 1 && nodes_.size() - i < kUsual; --i) {
-    usual += nodes_[i - 1].edge.covariance;
-    ++count;
+    const Relative4& edge = nodes_[i - 1].edge;
+    const int32_t of_edge = nodes_[i - 1].seq - nodes_[i - 2].seq;
+    usual += CovarianceAt(edge.covariance, -Lever(edge, of_edge));
+    steps += of_edge;
   }
   const Node& from = nodes_.back();
   node->edge.t = node->T_odom_body.t - from.T_odom_body.t;
   node->edge.yaw = 0;
-  // Errors of the missing steps add up; on average, the yaw error of a step acts on half of the
-  // gap.
-  node->edge.covariance =
-      CovarianceAt(usual * ((node->seq - from.seq) / count), 0.5 * node->edge.t);
+  const int32_t here = node->seq - from.seq;
+  node->edge.covariance = CovarianceAt(usual * (here / steps), Lever(node->edge, here));
   ++num_bridged_;
 }
 

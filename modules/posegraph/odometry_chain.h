@@ -34,7 +34,8 @@ class OdometryChain {
 
   // False if the keyframe is a repeat or older than the newest one. A keyframe without an edge from
   // its predecessor is joined to it by a composite edge: the relative pose of their two odometry
-  // poses, with the mean covariance of this map's recent edges, once per missing keyframe.
+  // poses, with the mean covariance that this map's recent edges have per step of seq, once per
+  // step.
   bool Add(const Keyframe& keyframe);
 
   void Save(ByteWriter* writer) const;

@@ -74,5 +74,21 @@ TEST(OdometryChain, DriftIsNeverNegative) {
   EXPECT_NEAR(chain.PathBetween(3, 4), kStep.norm(), 1e-9);
 }
 
+// However many keyframes of a map are lost, a step is as uncertain as a step.
+TEST(OdometryChain, GapsDoNotMakeLaterGapsMoreUncertain) {
+  constexpr int kBegin = 20, kGaps = 300;
+  OdometryChain chain;
+  for (int seq = 0; seq <= kBegin; ++seq) {
+    ASSERT_TRUE(chain.Add(Along(seq)));
+  }
+  for (int gap = 1; gap <= kGaps; ++gap) {
+    ASSERT_TRUE(chain.Add(Along(kBegin + 2 * gap)));
+  }
+  ASSERT_EQ(chain.num_bridged(), kGaps);
+  const Matrix4d& covariance = chain[chain.size() - 1].edge.covariance;
+  EXPECT_NEAR(covariance(3, 3), 2 * kSigmaYaw * kSigmaYaw, 0.2 * kSigmaYaw * kSigmaYaw);
+  EXPECT_NEAR(covariance(0, 0), 2 * kSigma_m * kSigma_m, 0.5 * kSigma_m * kSigma_m);
+}
+
 }  // namespace
 }  // namespace pangea
