@@ -24,6 +24,15 @@ Eigen::Vector3d MiddleOfScene(const Keyframe& keyframe) {
   return keyframe.T_odom_cam() * Eigen::Vector3d(0, 0, depth);
 }
 
+// An edge that knows less than this knows nothing. Beside larger variances, those of all later
+// edges would vanish in the rounding of the sums.
+Matrix4d Bounded(const Matrix4d& covariance) {
+  constexpr double kMaxSigma_m = 100, kMaxSigmaYaw = 3.2;
+  const Vector4d most(kMaxSigma_m, kMaxSigma_m, kMaxSigma_m, kMaxSigmaYaw);
+  const Vector4d factor = most.cwiseQuotient(covariance.diagonal().cwiseSqrt()).cwiseMin(1);
+  return factor.asDiagonal() * covariance * factor.asDiagonal();
+}
+
 // The errors of an edge's steps add up; on average, the yaw error of a step acts on half of them.
 Eigen::Vector3d Lever(const Relative4& edge, int32_t steps) {
   return (steps > 1 ? 0.5 : 0.0) * edge.t;
@@ -76,6 +85,7 @@ void OdometryChain::JoinByEdge(const OdometryEdge& edge, Node* node) const {
   const Node& from = nodes_.back();
   node->edge = MakeRelative4(edge.T_from_this, edge.covariance, from.T_odom_body.q,
                              from.roll_pitch_covariance, node->T_odom_body.q);
+  node->edge.covariance = Bounded(node->edge.covariance);
 }
 
 void OdometryChain::Bridge(Node* node) {

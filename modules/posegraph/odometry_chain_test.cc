@@ -90,5 +90,25 @@ TEST(OdometryChain, GapsDoNotMakeLaterGapsMoreUncertain) {
   EXPECT_NEAR(covariance(0, 0), 2 * kSigma_m * kSigma_m, 0.5 * kSigma_m * kSigma_m);
 }
 
+// An odometry that was lost for a moment may say so with any variance.
+TEST(OdometryChain, OneVagueEdgeDoesNotHideTheLaterOnes) {
+  constexpr int kVague = 100;
+  OdometryChain chain, certain;
+  for (int seq = 0; seq < 2 * kVague; ++seq) {
+    Keyframe keyframe = Along(seq);
+    certain.Add(keyframe);
+    if (seq == kVague) {
+      keyframe.edge->covariance = 1e12 * Matrix6d::Identity();
+    }
+    ASSERT_TRUE(chain.Add(keyframe));
+  }
+  const Eigen::Vector3d& end = chain[2 * kVague - 1].T_odom_body.t;
+  const Matrix4d later = chain.DriftBetween(kVague, 2 * kVague - 1, end);
+  EXPECT_TRUE(later.isApprox(certain.DriftBetween(kVague, 2 * kVague - 1, end), 1e-6)) << later;
+  const Matrix4d vague = chain.DriftBetween(kVague - 1, kVague, chain[kVague].T_odom_body.t);
+  EXPECT_GT(vague(0, 0), 1000);  // m^2
+  EXPECT_GT(vague(3, 3), 3);     // rad^2
+}
+
 }  // namespace
 }  // namespace pangea
