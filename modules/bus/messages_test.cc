@@ -124,6 +124,7 @@ TEST(Messages, BadKeyframesAreRefusedWithAReason) {
       [](KeyframeMessage* m) { m->camera.readout_s = std::numeric_limits<double>::infinity(); },
       [&](KeyframeMessage* m) { m->v_odom_body.y = nan; },
       [](KeyframeMessage* m) { m->preintegration.bias_jacobian[3] = 1e200; },
+      [](KeyframeMessage* m) { m->preintegration.duration_s = 1e-300; },
       [](KeyframeMessage* m) { m->num_corners = 701; },
       [](KeyframeMessage* m) { m->T_odom_body.rotation.w += 1; },
       [&](KeyframeMessage* m) { m->T_odom_body.translation.x = nan; },

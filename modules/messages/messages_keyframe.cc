@@ -18,6 +18,8 @@ constexpr double kPixelScale = 16.0;
 // The largest entry is d(position)/d(accelerometer bias), half the duration squared; after an hour
 // this is 6.5e6 s^2.
 constexpr double kMaxBiasJacobian = 1e7;
+// A step of utime. The information on the biases is inverse to the duration, so it must be finite.
+constexpr double kMinDuration_s = 1e-6;
 
 using Vector36 = Eigen::Matrix<double, 36, 1>;
 
@@ -48,10 +50,11 @@ Parsed<Preintegration> Parse(const preintegration_t& m) {
   p.gyro_bias = ToVector(m.gyro_bias);
   p.accel_bias = ToVector(m.accel_bias);
   const auto covariance = ToCovariance<9>(m.covariance);
-  if (!(p.duration_s > 0 && p.duration_s < 3600) || !(std::abs(p.delta_q.norm() - 1) < 1e-3) ||
-      !Bounded(p.delta_v, kMaxDistance) || !Bounded(p.delta_p, kMaxDistance) ||
-      !p.bias_jacobian.allFinite() || p.bias_jacobian.cwiseAbs().maxCoeff() > kMaxBiasJacobian ||
-      !Bounded(p.gyro_bias, 10) || !Bounded(p.accel_bias, 100) || !covariance) {
+  if (!(p.duration_s >= kMinDuration_s && p.duration_s < 3600) ||
+      !(std::abs(p.delta_q.norm() - 1) < 1e-3) || !Bounded(p.delta_v, kMaxDistance) ||
+      !Bounded(p.delta_p, kMaxDistance) || !p.bias_jacobian.allFinite() ||
+      p.bias_jacobian.cwiseAbs().maxCoeff() > kMaxBiasJacobian || !Bounded(p.gyro_bias, 10) ||
+      !Bounded(p.accel_bias, 100) || !covariance) {
     return Refused<Preintegration>("preintegration out of range");
   }
   p.delta_q.normalize();
