@@ -70,6 +70,28 @@ TEST(GlobalBa, WithoutInertialMeasurementsTheEdgesGiveTheScale) {
   }
 }
 
+// Edges of any claimed accuracy, such as those of a simulator, must not outweigh the rounding of
+// all else.
+TEST(GlobalBa, AnOdometryThatCallsItselfExactDoesNoHarm) {
+  const BaTestWorld world = MakeBaTestWorld({.edge_sigma_m = 0.002});
+  for (const double variance : {1e-12, 1e-18, 1e-310}) {
+    BaTestMessages messages = MessagesOf(world);
+    for (size_t i = 1; i < messages.keyframes.size(); ++i) {
+      Keyframe& keyframe = messages.keyframes[i];
+      if (keyframe.edge && keyframe.id.map.agent_id == 2) {
+        keyframe.edge->T_from_this = world.truth.keyframes[i - 1].imu.T_odom_body.Inverse() *
+                                     world.truth.keyframes[i].imu.T_odom_body;
+        keyframe.edge->covariance = variance * Matrix6d::Identity();
+      }
+    }
+    const auto refined = Server(messages).Finish();
+    ASSERT_TRUE(refined);
+    EXPECT_LT(WorstError(Moved(world.start, *refined), world.truth),
+              0.2 * WorstError(world.start, world.truth))
+        << variance;
+  }
+}
+
 // Nothing but its edges says where a keyframe is that sees no landmark.
 TEST(GlobalBa, AKeyframeWithoutLandmarksMovesWithItsEdges) {
   BaTestWorld world = MakeBaTestWorld({.edge_sigma_m = 0.002, .imu = false});

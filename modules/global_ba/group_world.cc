@@ -24,6 +24,14 @@ BaKeyframe Start(const Keyframe& keyframe, const Rigid3& T_map_body) {
   return start;
 }
 
+// No odometry is more accurate, whatever it says: such an edge would outweigh the rounding of all
+// else.
+Matrix6d Believable(Matrix6d covariance) {
+  constexpr double kLeastSigma = 1e-5;  // m, rad
+  covariance.diagonal() = covariance.diagonal().cwiseMax(kLeastSigma * kLeastSigma);
+  return covariance;
+}
+
 void SetUnknownScales(const std::vector<std::vector<double>>& sigmas_of_maps, BaWorld* world) {
   std::vector<double> unknown;
   for (const std::vector<double>& sigmas : sigmas_of_maps) {
@@ -66,7 +74,7 @@ class Maker {
       if (previous != index_.end()) {
         start.previous = previous->second;
         start.preintegration = keyframe.preintegration;
-        start.edge = {keyframe.edge->T_from_this, keyframe.edge->covariance};
+        start.edge = {keyframe.edge->T_from_this, Believable(keyframe.edge->covariance)};
       }
     }
     index_[id] = static_cast<int>(world_.keyframes.size());
