@@ -150,8 +150,9 @@ void GlobalBa::Take(const Constraint& constraint) {
 void GlobalBa::Take(MapState state) {
   std::ranges::sort(state.maps);
   const StatePointer taken = states_.Take(std::move(state));
+  const bool is_newest = states_.Find(taken->group) == taken.get();
   const auto refined = refined_.find(taken->group);
-  if (refined != refined_.end() && refined->second.basis == BasisOf(*taken) &&
+  if (is_newest && refined != refined_.end() && refined->second.basis == BasisOf(*taken) &&
       !refined->second.adjusted.IsShapeOf(PosesOf(*taken))) {
     refined_.erase(refined);
   }

@@ -243,6 +243,18 @@ TEST(GlobalBa, AGroupIsDueAgainWhenThePoseGraphHasForgotten) {
   EXPECT_TRUE(server.Finish().has_value());
 }
 
+TEST(GlobalBa, AStateThatComesLateChangesNothing) {
+  const BaTestMessages messages = MessagesOf(MakeBaTestWorld({.keyframes = 8}));
+  Server server(messages);
+  MapState refined = *server.Finish();
+  refined.revision = 3;
+  server.ba.Take(refined);
+  MapState late = messages.state;
+  late.revision = 2;
+  server.ba.Take(late);
+  EXPECT_FALSE(server.ba.HasWork());
+}
+
 TEST(GlobalBa, AMapWithoutLoopsIsNotDue) {
   BaTestMessages messages = MessagesOf(MakeBaTestWorld({.agents = 1}));
   EXPECT_EQ(messages.state.num_constraints, 0);
