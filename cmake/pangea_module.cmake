@@ -30,6 +30,8 @@ if(PANGEA_SANITIZE)
   endif()
 endif()
 
+find_program(PYTHON3 python3 REQUIRED)  # for tests
+
 # Builds everything that users run and that `cmake --install` installs, except tests and web pages.
 add_custom_target(programs)
 
@@ -94,7 +96,7 @@ function(pangea_manual_page name)
 endfunction()
 
 # pangea_program(name [INTERNAL] SOURCES ... DEPENDS ...) defines a program, and a test that its
-# --help works. An INTERNAL program is not installed.
+# --help works. An INTERNAL program (e.g. a bench) is neither installed nor one of `programs`.
 function(pangea_program name)
   if(EMSCRIPTEN)
     return()
@@ -107,8 +109,8 @@ function(pangea_program name)
   # The expensive computations are in the libraries; with -O1, CLI11 compiles a third faster.
   target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-O1>)
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
-  add_dependencies(programs ${name})
   if(NOT ARG_INTERNAL)
+    add_dependencies(programs ${name})
     install(TARGETS ${name} RUNTIME COMPONENT runtime)
     # Bash looks for a file that has the program's name.
     install(FILES ${CMAKE_SOURCE_DIR}/scripts/completion/pangea.bash RENAME ${name} COMPONENT runtime

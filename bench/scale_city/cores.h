@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "bench/process_use.h"
 #include "bench/scale_city/city.h"
-#include "bench/use_by_process.h"
 #include "core/group_states.h"
 #include "fusion/fusion.h"
 #include "global_ba/global_ba.h"

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "bench/use_by_process.h"
+#include "bench/process_use.h"
 #include "core/keyframe.h"
 #include "core/server_messages.h"
 #include "fusion/fusion.h"

@@ -12,7 +12,7 @@
 
 #include "bus/retransmission/missing.h"
 #include "bus/wall_clock.h"
-#include "core/candidates/constraint_id.h"
+#include "core/server_messages.h"
 #include "messages/catch_up_messages.h"
 #include "messages/channels.h"
 #include "messages/messages.h"

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "bus/retransmission/missing.h"
-#include "core/candidates/constraint_id.h"
+#include "core/server_messages.h"
 #include "messages/channels.h"
 #include "messages/messages.h"
 

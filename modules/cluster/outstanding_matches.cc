@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "core/candidates/constraint_id.h"
+#include "core/server_messages.h"
 
 namespace pangea {
 namespace {

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/candidates/constraint_id.h"
+#include "core/server_messages.h"
 
 namespace pangea {
 namespace {

@@ -4,7 +4,7 @@
 
 #include "bus/parse_message.h"
 #include "core/candidates/candidate_order.h"
-#include "core/candidates/constraint_id.h"
+#include "core/server_messages.h"
 #include "messages/messages.h"
 
 namespace pangea {

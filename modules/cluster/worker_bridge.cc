@@ -7,7 +7,7 @@
 
 #include "bus/parse_message.h"
 #include "bus/retransmission/missing.h"
-#include "core/candidates/constraint_id.h"
+#include "core/server_messages.h"
 #include "messages/channels.h"
 #include "messages/messages.h"
 

@@ -1,5 +1,7 @@
 #include "core/rigid3.h"
 
+#include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -96,6 +98,11 @@ Matrix6d InverseCovariance(const Rigid3& T_a_b, const Matrix6d& covariance) {
   J.topRightCorner<3, 3>() = -R_b_a * Hat(T_a_b.t);
   J.bottomRightCorner<3, 3>() = -R_b_a;
   return J * covariance * J.transpose();
+}
+
+double LargestSigma(const Eigen::Matrix3d& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance, Eigen::EigenvaluesOnly);
+  return std::sqrt(std::max(0.0, solver.eigenvalues().maxCoeff()));
 }
 
 }  // namespace pangea

@@ -62,4 +62,7 @@ Matrix6d ComposeCovariance(const Rigid3& T_a_b, const Matrix6d& cov_a_b, const R
 // Covariance of T_b_a from that of T_a_b, to first order.
 Matrix6d InverseCovariance(const Rigid3& T_a_b, const Matrix6d& covariance);
 
+// Standard deviation in the direction in which it is largest.
+double LargestSigma(const Eigen::Matrix3d& covariance);
+
 }  // namespace pangea

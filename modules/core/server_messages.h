@@ -40,6 +40,14 @@ struct PlaceMatch {
 // determine the relative pose well. Its matched corners are still useful for bundle adjustment.
 inline constexpr char kRedundant[] = "redundant";
 
+inline int64_t ConstraintId(const KeyframeId& from, const KeyframeId& to, PlaceKind kind) {
+  return static_cast<int64_t>(StableHash(from, to, static_cast<uint64_t>(kind)) >> 1);
+}
+// Of a candidate's verification result: known before there is a result.
+inline int64_t ConstraintId(const KeyframeId& query, const PlaceCandidate& candidate) {
+  return ConstraintId(candidate.match, query, candidate.kind);
+}
+
 // The verification result of a candidate; there is exactly one for each candidate.
 struct Constraint {
   KeyframeId from;  // the candidate's match
@@ -53,9 +61,7 @@ struct Constraint {
   double inlier_ratio = 0;
   double rms_px = 0;
 
-  int64_t Id() const {
-    return static_cast<int64_t>(StableHash(from, to, static_cast<uint64_t>(kind)) >> 1);
-  }
+  int64_t Id() const { return ConstraintId(from, to, kind); }
 };
 
 // The drift of an agent's odometry: T_map_odom of one of its maps.

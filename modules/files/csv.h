@@ -16,7 +16,7 @@ struct CsvRow {
   bool line_ended = true;           // false: the file ends without a newline after this row
 };
 
-// Splits each line at commas or, if it has none, at blanks. Skips empty lines, lines that begin
+// Splits each line at commas or, if it has none, at blanks. Skips empty lines, those that begin
 // with
 // '#', and a header: line 1, if its first field is not a number. Throws as OpenFile (text_file.h).
 std::vector<CsvRow> ReadCsv(const std::string& path);

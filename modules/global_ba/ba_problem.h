@@ -13,9 +13,9 @@
 // keyframes: without it the adjustment would have less information on a map than its odometry. The
 // correlation of their errors is unknown, so the two are weighted by covariance intersection
 // (Julier and Uhlmann, 1997), which is consistent for any correlation. An edge without an inertial
-// measurement beside it has its full weight. The edges of a map share an
-// error of scale that their covariances do not contain: it is one unknown per map
-// (ScalePriorFactor), with the odometry's own sigma if the map is not metric.
+// measurement beside it has its full weight. The edges of a map share an error of scale that their
+// covariances do not contain: it is one unknown per map (ScalePriorFactor), with the odometry's own
+// sigma if the map is not metric.
 //
 // Two rounds of Levenberg-Marquardt (solver/ba_solver.h): the first, with Cauchy's loss, finds the
 // outliers, which are dropped; the second, with Huber's loss, estimates the rest. Position and yaw

@@ -149,10 +149,11 @@ std::string KeyFileName(int32_t agent_id) { return fmt::format("agent_{}.key", a
 
 void MakeKeyFile(const fs::path& file, int32_t agent_id, AnchorRight anchors) {
   std::string text = fmt::format(
-      "# Lets agent {0} into a Pangea server. Secret: a copy for the agent (pangea-uplink --key), "
-      "a "
-      "copy for the\n# server's folder of keys (pangea-agent-handler --keys).\nagent: {0}\nkey: "
-      "{1}\n"
+      "# Lets agent {0} into a Pangea server. Secret: a copy for the agent (pangea-uplink "
+      "--key), a copy for the\n"
+      "# server's folder of keys (pangea-agent-handler --keys).\n"
+      "agent: {0}\n"
+      "key: {1}\n"
       "# What the agent may do with anchors, by the server's copy: read, own (edit those it made), "
       "write (edit all).\n{2}anchors: {3}\n",
       agent_id, ToHex(SecretKey::Random()), anchors == AnchorRight::kEditOwn ? "# " : "",

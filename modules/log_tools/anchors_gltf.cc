@@ -95,7 +95,7 @@ class GltfWriter {
              {{"anchor", ToString(id)},
               {"revision", anchor.revision},
               {"payload", std::move(payload)},
-              {"sigma_m", PositionSigma(*anchor.state)}}}};
+              {"sigma_m", RmsPositionSigma(*anchor.state)}}}};
   }
 
   // Appends to the buffer; returns the index of the accessor.

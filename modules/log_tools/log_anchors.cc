@@ -146,7 +146,7 @@ ordered_json AnchorJson(const AnchorId& id, const LoggedAnchor& anchor) {
     json["group_revision"] = state.group_revision;
     json["T_map_anchor"] = PoseJson(state.T_odom_anchor);
     json["covariance"] = CovarianceJson(state.covariance);
-    json["sigma_m"] = PositionSigma(state);
+    json["sigma_m"] = RmsPositionSigma(state);
   }
   if (anchor.place) {
     json["edit"] = PlaceJson(*anchor.place);
@@ -160,7 +160,7 @@ std::string Row(const AnchorId& id, const LoggedAnchor& anchor) {
     const Eigen::Vector3d& t = anchor.state->T_odom_anchor.t;
     place = fmt::format("{:<24} {:>24} {:>8.3f}", ToString(anchor.state->group),
                         fmt::format("{:.3f} {:.3f} {:.3f}", t.x(), t.y(), t.z()),
-                        PositionSigma(*anchor.state));
+                        RmsPositionSigma(*anchor.state));
   }
   return fmt::format("{:<24} {:<11} {:>8} {:<8} {} {:>9}  {}\n", ToString(id), MakerOf(id),
                      anchor.revision, StateOf(anchor), place, anchor.payload.size(), anchor.name);
@@ -175,7 +175,7 @@ LoggedAnchors ReadAnchors(const std::string& log, LogReadings* readings) {
   return collector.Finish();
 }
 
-double PositionSigma(const AnchorState& state) {
+double RmsPositionSigma(const AnchorState& state) {
   return std::sqrt(state.covariance.topLeftCorner<3, 3>().trace() / 3);
 }
 

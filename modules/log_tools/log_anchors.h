@@ -36,7 +36,7 @@ struct LoggedAnchors {
 LoggedAnchors ReadAnchors(const std::string& log, LogReadings* readings = nullptr);
 
 // Standard deviation of the position, metres: root mean square over its axes.
-double PositionSigma(const AnchorState& state);
+double RmsPositionSigma(const AnchorState& state);
 
 // A table for people, with a remark if the log, named `log`, has only edits.
 std::string ToText(const LoggedAnchors& logged, const std::string& log);

@@ -120,7 +120,7 @@ TEST_F(LogAnchorsTest, TheTableHasTheNewest) {
   const LoggedAnchors logged = ReadAnchors(log);
   EXPECT_EQ(logged.num_refused, 0);
   ASSERT_THAT(logged.anchors, SizeIs(3));
-  EXPECT_NEAR(PositionSigma(*logged.anchors.at(kKettle).state), std::sqrt(2e-4), 1e-6);
+  EXPECT_NEAR(RmsPositionSigma(*logged.anchors.at(kKettle).state), std::sqrt(2e-4), 1e-6);
   const std::string text = ToText(logged, log);
   EXPECT_THAT(text,
               testing::ContainsRegex("1/10 +agent 1 +1 placed +1/1795251811384046 +1.000 2.000 "

@@ -275,8 +275,7 @@ int main(int argc, char** argv) {
   app.footer(
       "Exit code: 0; 1 when something could not be done; 2 when logs differ; 3 when something of a "
       "log is lost (it is damaged, or ends in the middle of an event): then all is of what could "
-      "be "
-      "read; above 100 for a wrong command line.");
+      "be read; above 100 for a wrong command line.");
   pangea::session::Arguments arguments;
   pangea::session::AddCommands(app, &arguments);
   const int failed = pangea::RunSubcommand(app, argc, argv);

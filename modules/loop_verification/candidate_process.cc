@@ -7,7 +7,7 @@
 
 #include "bus/record_status.h"
 #include "core/candidates/candidate_order.h"
-#include "core/candidates/constraint_id.h"
+#include "core/server_messages.h"
 #include "messages/catch_up_messages.h"
 #include "messages/channels.h"
 #include "messages/messages.h"

@@ -1,6 +1,5 @@
 #include "loop_verification/known_constraints.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -15,12 +14,6 @@ namespace {
 // Sigma of the odometry's position per metre of path; the same as in pair_evidence.cc.
 constexpr double kDriftPerM = 0.02;
 
-double WorstSigma(const Matrix6d& covariance) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance.topLeftCorner<3, 3>(),
-                                                              Eigen::EigenvaluesOnly);
-  return std::sqrt(solver.eigenvalues().maxCoeff());
-}
-
 // Path length between two keyframes of one map, m.
 std::optional<double> PathBetween(const MapId& map, int32_t a, int32_t b,
                                   const SubmapStore& store) {
@@ -31,8 +24,9 @@ std::optional<double> PathBetween(const MapId& map, int32_t a, int32_t b,
 
 void KnownConstraints::Add(const Constraint& constraint) {
   const auto [a, b] = std::minmax(constraint.from, constraint.to);
-  by_maps_[{a.map, b.map}].insert(
-      {a.seq, {a.seq, b.seq, a == constraint.to, WorstSigma(constraint.covariance)}});
+  by_maps_[{a.map, b.map}].insert({a.seq,
+                                   {a.seq, b.seq, a == constraint.to,
+                                    LargestSigma(constraint.covariance.topLeftCorner<3, 3>())}});
 }
 
 bool KnownConstraints::IsRedundant(const KeyframeId& query, const KeyframeId& match,

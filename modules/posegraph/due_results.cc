@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "bus/retransmission/timeouts.h"
-#include "core/candidates/constraint_id.h"
+#include "core/server_messages.h"
 #include "messages/catch_up_messages.h"
 
 namespace pangea {

@@ -28,9 +28,8 @@ int main(int argc, char** argv) {
   app.add_option("--duration", options.duration_s, "seconds to play (default: to the end)")
       ->check(pangea::Positive());
   app.footer(
-      "Exit code: 0; 1 when it failed; 3 when something of the log is lost (it is damaged, or ends "
-      "in "
-      "the middle of an event): then what could be read was played.");
+      "Exit code: 0; 1 when it failed; 3 when something of the log is lost (it is damaged, or "
+      "ends in the middle of an event): then what could be read was played.");
   CLI11_PARSE(app, argc, argv);
   pangea::LogReadings readings;
   try {

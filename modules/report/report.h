@@ -11,9 +11,10 @@
 //   map.ply                  points coloured by agent, in the largest group's map frame (other
 //                            groups, whose frames are unrelated to it: map.<map>.ply)
 //   report.json, report.md, report.html
-//   anchors.jpg              up to four anchors in the images of two agents; none without
-//   recordings trajectory.png, error.png  (groups that no ground truth places:
-//   trajectory.<map>.png)
+//   anchors.jpg              up to four anchors in the images of two agents, if the recordings
+//                            are at hand
+//   trajectory.png, error.png
+//                            (groups that no ground truth places: trajectory.<map>.png)
 //
 // A map that no MAP_STATE mentions is a group of its own, with the odometry's poses. <map> is
 // "<agent>_<opened utime>".

@@ -12,8 +12,7 @@ inline constexpr const char* kAnchorPicture = "anchors.jpg";
 inline constexpr size_t kMaxAnchorPictures = 4;
 inline constexpr const char* kAnchorPictureExplained =
     "Left: where the agent placed it. Right: another agent's image. The cube stands where the "
-    "agent "
-    "shows the anchor, the circle is where ground truth has it.";
+    "agent shows the anchor, the circle is where ground truth has it.";
 
 // One row for each of the first kMaxAnchorPictures anchors in images of two agents: the image in
 // which it was placed, and the other agent's image in which it is furthest inside. Returns a JPEG;

@@ -18,9 +18,9 @@ std::string ReportMarkdown(const ReportInput& input, const CapturedSession& sess
     text += fmt::format("**{}**\n\n- {}\n\n", kLostExplained, fmt::join(metrics.lost, "\n- "));
   }
   text += fmt::format(
-      "{}\nATE: RMSE of positions after SE(3) alignment without scale; it "
-      "counts "
-      "with coverage of at least 0.95 and one map.\n",
+      "{}\n"
+      "ATE: RMSE of positions after SE(3) alignment without scale; it counts with coverage of at "
+      "least 0.95 and one map.\n",
       AgentTable(metrics).Text());
   if (const Table links = LinksTable(metrics); !links.empty()) {
     text += fmt::format("\n{}\nDelivered counts doubled packets twice.\n", links.Text());

@@ -366,8 +366,7 @@ void AddReplayCommand(CLI::App& app, CommandResult* result) {
   replay
       ->add_option("--from-checkpoint", arguments->checkpoint_s,
                    "The matches and verification results of the first so many seconds are taken "
-                   "from the log, "
-                   "not made again")
+                   "from the log, not made again")
       ->check(Positive());
   replay
       ->add_option("--only", arguments->only,

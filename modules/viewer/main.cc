@@ -44,9 +44,8 @@ int main(int argc, char** argv) {
   app.add_flag("--read-only", read_only, "pages show anchors, and cannot change them");
   app.add_option("--page", page, "folder of the built page")->capture_default_str();
   app.footer(
-      "Exit code: 0; 1 when it failed; 3 when something of the log is lost (it is damaged, or ends "
-      "in "
-      "the middle of an event): then what could be read was shown.");
+      "Exit code: 0; 1 when it failed; 3 when something of the log is lost (it is damaged, or "
+      "ends in the middle of an event): then what could be read was shown.");
   CLI11_PARSE(app, argc, argv);
   InstallSignalHandlers();
   try {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "core/candidates/constraint_id.h"
+#include "core/server_messages.h"
 
 namespace pangea {
 

@@ -13,4 +13,12 @@ struct RobustLoss {
   double Weight(double squared_residual) const;
 };
 
+// Huber's cost and weight, of the absolute residual.
+inline double HuberCost(double residual, double scale) {
+  return residual <= scale ? 0.5 * residual * residual : scale * (residual - 0.5 * scale);
+}
+inline double HuberWeight(double residual, double scale) {
+  return residual <= scale ? 1.0 : scale / residual;
+}
+
 }  // namespace pangea

@@ -1,6 +1,5 @@
 #include "loop_verification/steps/verification.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -63,11 +62,6 @@ std::string CheckGate(const CommonStepOptions& /*options*/, Verification* verifi
   const Rigid3 T_odom_c(Eigen::Quaterniond::Identity(), c.newest_keyframe().T_odom_body.t);
   const Rigid3& T_m_c = verification->ba ? verification->ba->T_m_c : verification->pose.T_m_c;
   return verification->gate(T_odom_m * T_m_c * T_odom_c.Inverse());
-}
-
-double LargestSigma(const Eigen::Matrix3d& covariance) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance);
-  return std::sqrt(solver.eigenvalues().maxCoeff());
 }
 
 }  // namespace pangea

@@ -95,7 +95,4 @@ struct Verification {
 // Applies the caller's gate to the present alignment.
 std::string CheckGate(const CommonStepOptions& options, Verification* verification);
 
-// Standard deviation in the direction where it is largest.
-double LargestSigma(const Eigen::Matrix3d& covariance);
-
 }  // namespace pangea

@@ -258,8 +258,7 @@ SessionScript ReadSessionFile(const fs::path& file, const std::optional<fs::path
         "{}: these are not there:\n  {}\n"
         "A recording is a EuRoC folder (with mav0/cam0 and mav0/imu0): put it there, or name the "
         "folder that holds the recordings with --recordings DIR. Keyframes are a log that "
-        "pangea-vio "
-        "--out-keyframes writes, or an earlier session's agent_<id>.lcm.",
+        "pangea-vio --out-keyframes writes, or an earlier session's agent_<id>.lcm.",
         file.string(), fmt::join(missing, "\n  ")));
   }
   return script;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/least_squares/levenberg_marquardt.h"
+#include "core/least_squares/robust_loss.h"
 
 namespace pangea::vio {
 namespace {
@@ -22,7 +23,7 @@ using Equations = StartProblem::Equations;
 
 constexpr double kGyroBiasSigma = 0.02;  // rad/s, about the epipolar solution
 constexpr double kHeld = 1e-8;           // rad^2, m^2: the first frame's yaw and position
-constexpr double kHuber = 2.0;           // sigmas
+constexpr double kStartHuber = 2.0;      // sigmas
 constexpr double kMinStartDepth = 0.05;  // m
 // The iteration stops if the predicted decrease of the cost is below this (0.5 is one sigma of one
 // direction).
@@ -33,9 +34,6 @@ constexpr double kPointEnough = 1e-4;
 constexpr int kPointIterations = 3;
 // relative, of an inverse depth in one step: at most ten times as far
 constexpr double kMaxRetreat = 0.9;
-
-double HuberCost(double e) { return e <= kHuber ? 0.5 * e * e : kHuber * (e - 0.5 * kHuber); }
-double HuberWeight(double e) { return e <= kHuber ? 1.0 : kHuber / e; }
 
 // A ray's residual in sigmas, and its Jacobians: the frame's pose, the point in odom.
 struct RayTerm {
@@ -75,7 +73,7 @@ double PointCost(const Cameras& cameras, const StartPoint& point, const Vector3d
   const double sigma = point.expected_sigma;
   double cost = 0.5 * (p_odom - point.expected).squaredNorm() / (sigma * sigma);
   for (const StartRay& seen : point.rays) {
-    cost += HuberCost(RayError(cameras, seen, p_odom));
+    cost += HuberCost(RayError(cameras, seen, p_odom), kStartHuber);
   }
   return cost;
 }
@@ -90,7 +88,7 @@ RayTerm LineariseRay(const Cameras& cameras, const StartRay& seen, const Vector3
   term.r = (y.head<2>() * inv - seen.ray) / cameras.ray_sigma;
   term.J_point = J * R_cam_odom / cameras.ray_sigma;
   term.J_pose << term.J_point * Hat(p_odom), -term.J_point;
-  const double root = std::sqrt(HuberWeight(term.r.norm()));
+  const double root = std::sqrt(HuberWeight(term.r.norm(), kStartHuber));
   term.r *= root;
   term.J_point *= root;
   term.J_pose *= root;

@@ -42,7 +42,7 @@ Eigen::RowVectorXd DepthJacobian(RowViews& views, const SeenPoint& seen) {
   Eigen::RowVectorXd J = Eigen::RowVectorXd::Zero(state.size());
   J.head<kCalibrationSize>() = gain.head<kCalibrationSize>();
   for (size_t i = 0; i < rays.size(); ++i) {
-    const int at = state.Offset(rays[i].frame), column = elimination.RayColumn(i);
+    const int at = state.FirstRow(rays[i].frame), column = elimination.RayColumn(i);
     J.segment<kPoseSize>(at) = gain.segment<kPoseSize>(column);
     if (state.frames[rays[i].frame].has_stamp_error()) {
       J[at + kStampError] = gain[column + kPoseSize];
@@ -120,7 +120,7 @@ Matrix6d RelativeCovariance(const WindowState& state, const MatrixXd& P_window, 
   J.block<3, 3>(0, 9) = R;
   J.block<3, 3>(3, 0) = -R;
   J.block<3, 3>(3, 6) = R;
-  const int at_i = state.Offset(i), at_j = state.Offset(j);
+  const int at_i = state.FirstRow(i), at_j = state.FirstRow(j);
   MatrixXd P(12, 12);
   P << P_window.block<6, 6>(at_i, at_i), P_window.block<6, 6>(at_i, at_j),
       P_window.block<6, 6>(at_j, at_i), P_window.block<6, 6>(at_j, at_j);
@@ -159,7 +159,7 @@ FinishedKeyframe FinishKeyframe(const WindowState& state, const MatrixXd& P,
   keyframe.motion = state.MotionAhead(index, state.Ahead(index, 0));
   keyframe.gyro_bias = frame.imu.gyro_bias;
   keyframe.accel_bias = frame.imu.accel_bias;
-  const int at = state.Offset(index);
+  const int at = state.FirstRow(index);
   keyframe.covariance = P.block<kFrameSize, kFrameSize>(at, at);
   keyframe.roll_pitch_covariance = P.block<2, 2>(at, at) + 1e-10 * Eigen::Matrix2d::Identity();
   AddDepths(state, P, PointsSeen(state, history, index), &keyframe);

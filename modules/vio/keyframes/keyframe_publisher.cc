@@ -9,7 +9,7 @@ namespace {
 
 // Time at which a frame's image was taken, on the IMU's clock.
 int64_t TakenAt(const WindowState& state, const WindowFrame& frame) {
-  return frame.utime + std::llround(1e6 * state.OffsetOf(frame)) +
+  return frame.utime + std::llround(1e6 * state.TimeOffsetOf(frame)) +
          std::llround(1e6 * frame.stamp_error_s);
 }
 
@@ -19,10 +19,10 @@ FinishedKeyframe KeyframePublisher::Publish(WindowState& state, const Eigen::Mat
                                             const TrackHistory& history, const ImuBuffer& imu,
                                             int index) {
   FinishedKeyframe keyframe = FinishKeyframe(state, P, history, index);
-  const int at = state.Offset(index);
+  const int at = state.FirstRow(index);
   const auto from = last_ ? state.Find(last_->utime) : std::nullopt;
   if (from) {
-    const int at_from = state.Offset(*from);
+    const int at_from = state.FirstRow(*from);
     keyframe.edge = FinishedKeyframe::Edge{last_->T_odom_body.Inverse() * keyframe.T_odom_body,
                                            RelativeCovariance(state, P, *from, index)};
     keyframe.edge->covariance +=

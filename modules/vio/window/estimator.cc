@@ -96,10 +96,10 @@ struct Estimator::Impl {
   std::optional<std::string> Implausible() const;
   // On the IMU's clock, with the time offset of the newest image.
   int64_t ImuTime(int64_t frame_utime) const {
-    return frame_utime + std::llround(1e6 * problem.state.OffsetAt(excess_interval_s));
+    return frame_utime + std::llround(1e6 * problem.state.TimeOffsetAt(excess_interval_s));
   }
   int64_t ImuTime(const WindowFrame& frame) const {
-    return frame.utime + std::llround(1e6 * problem.state.OffsetOf(frame));
+    return frame.utime + std::llround(1e6 * problem.state.TimeOffsetOf(frame));
   }
   WindowFrame& Newest() { return problem.state.frames.back(); }
   const WindowFrame& LastWindowKeyframe() const {
@@ -175,7 +175,7 @@ void Estimator::Impl::Append(int64_t utime, const ImuState& imu, std::optional<I
   frame.utime = utime;
   frame.imu_utime = ImuTime(utime);
   frame.excess_interval_s = excess_interval_s;
-  frame.time_offset_s = problem.state.OffsetOf(frame);
+  frame.time_offset_s = problem.state.TimeOffsetOf(frame);
   frame.stamp_sigma_s = stamps.sigma_s();
   frame.imu = imu;
   const BodyMotion motion =
@@ -255,7 +255,7 @@ void Estimator::Impl::PublishUpTo(int newest, std::vector<FinishedKeyframe>* fin
     if (frame.is_keyframe && !frame.is_published) {
       due.push_back(i);
       for (int k = kPoseSize; k < kFrameSize; ++k) {
-        rows.push_back(problem.state.Offset(i) + k);
+        rows.push_back(problem.state.FirstRow(i) + k);
       }
     }
   }
@@ -345,7 +345,6 @@ std::optional<std::string> Estimator::Impl::GapBefore(const TrackedFrame& frame)
   if (gap_s > kMaxFrameGap_s) {
     return fmt::format("no images for {:.1f} s", gap_s);
   }
-  excess_interval_s = stamps.excess_interval_s();
   return imu_samples.Gap(Newest().imu_utime, ImuTime(frame.utime));
 }
 
@@ -353,6 +352,7 @@ std::optional<std::string> Estimator::Impl::Track(const TrackedFrame& frame, Fra
   if (lost) {
     return "lost before";
   }
+  excess_interval_s = stamps.excess_interval_s();
   if (auto gap = GapBefore(frame)) {
     PublishUpTo(problem.state.Newest(), &result->finished);  // a gap does not spoil the window
     return gap;
@@ -425,7 +425,7 @@ CameraModel Estimator::camera() const {
   const WindowState& state = impl_->problem.state;
   CameraModel camera = state.Calibrated(impl_->camera);
   camera.time_offset_s =
-      state.frames.empty() ? state.time_offset_s : state.OffsetOf(state.frames.back());
+      state.frames.empty() ? state.time_offset_s : state.TimeOffsetOf(state.frames.back());
   return camera;
 }
 
@@ -437,7 +437,7 @@ WindowPoses Estimator::Poses() const {
     poses.utimes.push_back(state.frames[i].utime);
     poses.T_odom_body.push_back(state.PoseAhead(i, state.Ahead(i, 0)));
     for (int row = 0; row < kPoseSize; ++row) {
-      rows.push_back(state.Offset(i) + row);
+      rows.push_back(state.FirstRow(i) + row);
     }
   }
   poses.covariance = WindowCovariance(impl_->problem, rows)(rows, rows);

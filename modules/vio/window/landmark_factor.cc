@@ -6,6 +6,8 @@
 #include <limits>
 #include <vector>
 
+#include "core/least_squares/robust_loss.h"
+
 namespace pangea::vio {
 namespace {
 
@@ -23,16 +25,13 @@ constexpr double kHuber = 2.0;
 // that moving the point there gains nothing.
 constexpr double kBehind = 100;
 
-double HuberCost(double e) { return e <= kHuber ? 0.5 * e * e : kHuber * (e - 0.5 * kHuber); }
-double HuberWeight(double e) { return e <= kHuber ? 1.0 : kHuber / e; }
-
 // Rows of a frame's pose errors and of its stamp's error in the window's error vector.
 struct FrameColumns {
   int pose = 0;
   int stamp = -1;  // -1: no stamp error
 };
 FrameColumns ColumnsOf(const WindowState& state, int frame) {
-  const int pose = state.Offset(frame);
+  const int pose = state.FirstRow(frame);
   return {pose, state.frames[frame].has_stamp_error() ? pose + kStampError : -1};
 }
 
@@ -88,13 +87,14 @@ LandmarkTerms<kRay> LineariseLandmark(RowViews& rows, const Landmark& landmark) 
     const FrameRay& seen = landmark.rays[j];
     const auto predicted = PredictRay(rows, point, seen);
     if (!predicted) {
-      out.cost += HuberCost(kBehind);  // no derivative, as none would tell where to move the point
+      out.cost +=
+          HuberCost(kBehind, kHuber);  // no derivative, as none would tell where to move the point
       continue;
     }
     const Vector2d r = (predicted->ray - seen.ray) / seen.sigma;
     const double e = r.norm();
-    const double root = std::sqrt(HuberWeight(e)), scale = root / seen.sigma;
-    out.cost += HuberCost(e);
+    const double root = std::sqrt(HuberWeight(e, kHuber)), scale = root / seen.sigma;
+    out.cost += HuberCost(e, kHuber);
     RayTerms<kRay>& terms = out.rays.emplace_back();
     terms.ray = j;
     terms.r = root * r;
@@ -260,7 +260,7 @@ double LandmarkCost(RowViews& rows, const Landmark& landmark) {
   double cost = 0;
   for (const FrameRay& seen : landmark.rays) {
     const double error = RayError(rows, p_odom, seen);
-    cost += HuberCost(std::isfinite(error) ? error : kBehind);
+    cost += HuberCost(std::isfinite(error) ? error : kBehind, kHuber);
   }
   return cost;
 }

@@ -59,8 +59,8 @@ void AddImuFactor(const WindowState& state, const ImuFactor& factor, int to, Nor
     int at, begin, size;
   };
   const Part parts[] = {{kImuIntrinsics, 0, kImuIntrinsicsSize},
-                        {state.Offset(to - 1), kImuIntrinsicsSize, kFrameSize},
-                        {state.Offset(to), kImuIntrinsicsSize + kFrameSize, kMotion}};
+                        {state.FirstRow(to - 1), kImuIntrinsicsSize, kFrameSize},
+                        {state.FirstRow(to), kImuIntrinsicsSize + kFrameSize, kMotion}};
   for (const Part& column : parts) {
     out->g.segment(column.at, column.size) += b.segment(column.begin, column.size);
     for (const Part& row : parts) {
@@ -73,7 +73,7 @@ void AddImuFactor(const WindowState& state, const ImuFactor& factor, int to, Nor
   }
   const Vector6d walk = factor.information.diagonal().tail<6>();
   const Vector6d pull = walk.cwiseProduct(residual.r.tail<6>());
-  const int at_i = state.Offset(to - 1) + kGyroBias, at_j = state.Offset(to) + kGyroBias;
+  const int at_i = state.FirstRow(to - 1) + kGyroBias, at_j = state.FirstRow(to) + kGyroBias;
   out->H.diagonal().segment<6>(at_i) += walk;
   out->H.diagonal().segment<6>(at_j) += walk;
   out->H.block<6, 6>(at_i, at_j).diagonal() -= walk;
@@ -87,7 +87,7 @@ void AddZeroVelocityUpdate(const WindowState& state, int frame, NormalEquations*
   // with respect to xi_v is R^T.
   const Vector3d& v = state.frames[frame].imu.v_odom_body;
   const double information = 1 / (kStationaryVelocitySigma * kStationaryVelocitySigma);
-  const int at = state.Offset(frame) + kVelocity;
+  const int at = state.FirstRow(frame) + kVelocity;
   out->H.diagonal().segment<3>(at).array() += information;
   out->g.segment<3>(at) += information * v;
   out->cost += 0.5 * information * v.squaredNorm();
@@ -114,7 +114,7 @@ void AddZeroMotionUpdate(const WindowState& state, int to, NormalEquations* out)
   J.block<3, 3>(3, 9) = R_i / kStationaryPositionSigma;
   const Eigen::Matrix<double, 12, 12> A = J.transpose() * J;
   const Eigen::Matrix<double, 12, 1> b = J.transpose() * r;
-  const int at_i = state.Offset(to - 1), at_j = state.Offset(to);
+  const int at_i = state.FirstRow(to - 1), at_j = state.FirstRow(to);
   out->H.block<6, 6>(at_i, at_i) += A.topLeftCorner<6, 6>();
   out->H.block<6, 6>(at_i, at_j) += A.topRightCorner<6, 6>();
   out->H.block<6, 6>(at_j, at_i) += A.bottomLeftCorner<6, 6>();
@@ -127,7 +127,7 @@ void AddZeroMotionUpdate(const WindowState& state, int to, NormalEquations* out)
 void AddStampError(const WindowState& state, int frame, NormalEquations* out) {
   const double sigma = state.frames[frame].stamp_sigma_s;
   const double error = state.frames[frame].stamp_error_s / sigma;
-  const int at = state.Offset(frame) + kStampError;
+  const int at = state.FirstRow(frame) + kStampError;
   out->H(at, at) += 1 / (sigma * sigma);
   out->g[at] += error / sigma;
   out->cost += 0.5 * error * error;

@@ -31,7 +31,7 @@ void Step(const NormalEquations& equations, const VectorXd& step, WindowProblem*
                  elimination.gain.leftCols<kCalibrationSize>() * step.head<kCalibrationSize>();
     for (size_t j = 0; j < landmark.rays.size(); ++j) {
       const int at = elimination.RayColumn(j), frame = landmark.rays[j].frame;
-      const int offset = state.Offset(frame);
+      const int offset = state.FirstRow(frame);
       d += elimination.gain.middleCols<kPoseSize>(at) * step.segment<kPoseSize>(offset);
       if (state.frames[frame].has_stamp_error()) {
         d += elimination.gain.col(at + kPoseSize) * step[offset + kStampError];
@@ -165,7 +165,7 @@ void MarginaliseOldest(WindowProblem& problem, const Marginalisation& what) {
 
   // Which rows stay.
   std::vector<int> stay, go;
-  const int at_oldest = state.Offset(oldest);
+  const int at_oldest = state.FirstRow(oldest);
   const bool drops_kept = oldest == 1 && what.drop_kept_pose;
   for (int i = 0; i < state.size(); ++i) {
     const bool of_kept = oldest == 1 && i >= kSharedSize && i < at_oldest;

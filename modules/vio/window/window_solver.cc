@@ -42,7 +42,7 @@ std::optional<CholeskyFactor> Factorise(const WindowState& state, const MatrixXd
     const WindowFrame* older = i > 0 ? &state.frames[i - 1] : nullptr;
     met += older ? older->size() - (older->pose_only ? 0 : kMotionSize) : 0;
     MotionColumns& columns = factor.motions.emplace_back();
-    columns.at = state.Offset(i) + kPoseSize;
+    columns.at = state.FirstRow(i) + kPoseSize;
     Matrix9d own = H.block<kMotionSize, kMotionSize>(columns.at, columns.at);
     columns.of_rest = H.middleCols<kMotionSize>(columns.at)(
         std::vector<int>(factor.rest.begin(), factor.rest.begin() + met), Eigen::all);
@@ -56,7 +56,8 @@ std::optional<CholeskyFactor> Factorise(const WindowState& state, const MatrixXd
     }
     SolveOnTheRight(columns.own.matrixLLT(), columns.of_rest);
     if (older && !older->pose_only) {
-      columns.next = H.block<kMotionSize, kMotionSize>(state.Offset(i - 1) + kPoseSize, columns.at);
+      columns.next =
+          H.block<kMotionSize, kMotionSize>(state.FirstRow(i - 1) + kPoseSize, columns.at);
       columns.own.matrixU().solveInPlace<Eigen::OnTheRight>(columns.next);
     }
     SubtractSquare(columns.of_rest, factor.of_rest);
@@ -106,8 +107,8 @@ std::vector<int> RowsOfPoses(const WindowState& state) {
   };
   add(0, kSharedSize);
   for (int i = state.Newest(); i >= 0; --i) {
-    add(state.Offset(i), kPoseSize);
-    add(state.Offset(i) + kStampError, state.frames[i].has_stamp_error() ? 1 : 0);
+    add(state.FirstRow(i), kPoseSize);
+    add(state.FirstRow(i) + kStampError, state.frames[i].has_stamp_error() ? 1 : 0);
   }
   return rows;
 }

@@ -13,7 +13,7 @@ bool IsFinite(const WindowFrame& frame) {
          frame.omega_body.allFinite() && frame.alpha_body.allFinite() && frame.a_body.allFinite();
 }
 
-int WindowState::Offset(int frame) const {
+int WindowState::FirstRow(int frame) const {
   int offset = kSharedSize;
   for (int i = 0; i < frame; ++i) {
     offset += frames[i].size();

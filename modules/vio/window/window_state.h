@@ -42,7 +42,7 @@ using Intrinsics = Eigen::Matrix<double, kIntrinsicsSize, 1>;
 struct WindowFrame {
   int64_t utime = 0;         // of its TrackedFrame
   int64_t imu_utime = 0;     // utime + time_offset_s
-  double time_offset_s = 0;  // WindowState::OffsetOf(*this) when the frame was added
+  double time_offset_s = 0;  // WindowState::TimeOffsetOf(*this) when the frame was added
   // By how much the interval between images exceeds that at the start (image_stamps.h).
   double excess_interval_s = 0;
   // The image was taken this much later than its stamp says (estimate and sigma; image_stamps.h).
@@ -50,9 +50,9 @@ struct WindowFrame {
   double stamp_sigma_s = 0;  // 0: stamps are exact, stamp_error_s is no variable
   ImuState imu;
   // Motion of the body while the rows are read out (body_motion.h).
-  Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();
-  Eigen::Vector3d alpha_body = Eigen::Vector3d::Zero();
-  Eigen::Vector3d a_body = Eigen::Vector3d::Zero();
+  Eigen::Vector3d omega_body = Eigen::Vector3d::Zero();  // rad/s
+  Eigen::Vector3d alpha_body = Eigen::Vector3d::Zero();  // rad/s^2
+  Eigen::Vector3d a_body = Eigen::Vector3d::Zero();      // m/s^2, without gravity
   bool is_window_keyframe = false;  // keeps its place; else the next frame replaces it
   bool is_keyframe = false;         // it is, or will be, published
   bool is_published = false;
@@ -81,24 +81,26 @@ struct WindowState {
   ImuIntrinsics imu_intrinsics;
   std::vector<WindowFrame> frames;  // oldest first
 
-  int Offset(int frame) const;
-  int size() const { return Offset(static_cast<int>(frames.size())); }
+  int FirstRow(int frame) const;  // of the frame's errors in the window's error vector
+  int size() const { return FirstRow(static_cast<int>(frames.size())); }
   int Newest() const { return static_cast<int>(frames.size()) - 1; }
   std::optional<int> Find(int64_t utime) const;
   // `given` with the estimated extrinsics, time offset, focal length, principal point and
   // distortion.
   CameraModel Calibrated(CameraModel given) const;
 
-  double OffsetAt(double excess_interval_s) const {
+  double TimeOffsetAt(double excess_interval_s) const {
     return time_offset_s + interval_share * excess_interval_s;
   }
-  double OffsetOf(const WindowFrame& frame) const { return OffsetAt(frame.excess_interval_s); }
+  double TimeOffsetOf(const WindowFrame& frame) const {
+    return TimeOffsetAt(frame.excess_interval_s);
+  }
   // The time, in seconds after the frame's state, at which a row was exposed that is exposed
   // `row_s` after the image's time. PoseAhead and MotionAhead extrapolate the frame's state to such
   // a time.
   double Ahead(int frame, double row_s) const {
     const WindowFrame& f = frames[frame];
-    return OffsetOf(f) - f.time_offset_s + f.stamp_error_s + row_s;
+    return TimeOffsetOf(f) - f.time_offset_s + f.stamp_error_s + row_s;
   }
   Rigid3 PoseAhead(int frame, double ahead_s) const;
   BodyMotion MotionAhead(int frame, double ahead_s) const;

@@ -56,8 +56,8 @@ TEST(ImuFactorTest, DerivativesMatchDifferencesInEveryColumn) {
     const InertialResidual residual = ResidualOf(problem, state);
     ASSERT_GT(residual.r.norm(), 0.05);
     MatrixXd J = MatrixXd::Zero(15, state.size());
-    J.middleCols<15>(state.Offset(0)) = residual.J_from;
-    J.middleCols<15>(state.Offset(1)) = residual.J_to;
+    J.middleCols<15>(state.FirstRow(0)) = residual.J_from;
+    J.middleCols<15>(state.FirstRow(1)) = residual.J_to;
     J.middleCols<kImuIntrinsicsSize>(kImuIntrinsics) =
         ImuIntrinsicsJacobian(problem.imu_factors[1]->span, state.imu_intrinsics,
                               state.frames[0].imu.gyro_bias, residual.r.head<3>());
@@ -73,8 +73,8 @@ TEST(ImuFactorTest, ShiftsAndRotationsTogetherAreFree) {
   state.Retract(RandomError(state, 0.1, 3));
   const InertialResidual residual = ResidualOf(problem, state);
   MatrixXd J = MatrixXd::Zero(15, state.size());
-  J.middleCols<15>(state.Offset(0)) = residual.J_from;
-  J.middleCols<15>(state.Offset(1)) = residual.J_to;
+  J.middleCols<15>(state.FirstRow(0)) = residual.J_from;
+  J.middleCols<15>(state.FirstRow(1)) = residual.J_to;
   EXPECT_LT((J * UnobservableDirections(state)).cwiseAbs().maxCoeff(), 1e-12);
 }
 

@@ -38,20 +38,20 @@ TEST(PredictRay, DerivativesMatchDifferencesInEveryColumn) {
         ASSERT_TRUE(predicted);
         MatrixXd J = MatrixXd::Zero(2, state.size());
         J.leftCols(kCalibrationSize) = predicted->J_calibration;
-        J.middleCols<kPoseSize>(state.Offset(anchor)) += predicted->J_anchor;
-        J.middleCols<kPoseSize>(state.Offset(seen.frame)) += predicted->J_frame;
+        J.middleCols<kPoseSize>(state.FirstRow(anchor)) += predicted->J_anchor;
+        J.middleCols<kPoseSize>(state.FirstRow(seen.frame)) += predicted->J_frame;
         const auto add_stamp = [&](int frame, const Eigen::Vector2d& J_stamp) {
           if (state.frames[frame].has_stamp_error()) {
-            J.col(state.Offset(frame) + kStampError) += J_stamp;
+            J.col(state.FirstRow(frame) + kStampError) += J_stamp;
           }
         };
         add_stamp(anchor, predicted->J_anchor_stamp);
         add_stamp(seen.frame, predicted->J_frame_stamp);
         // The analytic Jacobian neglects only this: an error of the velocity moves the pose at the
         // row's time.
-        J.middleCols<3>(state.Offset(anchor) + kVelocity) +=
+        J.middleCols<3>(state.FirstRow(anchor) + kVelocity) +=
             state.Ahead(anchor, landmark.point.anchor_row_s) * predicted->J_anchor.rightCols<3>();
-        J.middleCols<3>(state.Offset(seen.frame) + kVelocity) +=
+        J.middleCols<3>(state.FirstRow(seen.frame) + kVelocity) +=
             state.Ahead(seen.frame, seen.row_s) * predicted->J_frame.rightCols<3>();
         const MatrixXd numeric = NumericJacobian(state, [&](const WindowState& s) -> VectorXd {
           RowViews changed(s);

@@ -84,7 +84,7 @@ MatrixXd KeptInPlainErrors(const WindowPrior& prior, const WindowState& now) {
   for (int side = 0; side < 2; ++side) {
     for (int i = 0; i <= now.Newest(); ++i) {
       const ImuState &then_i = prior.at.frames[i].imu, &now_i = now.frames[i].imu;
-      const int at = now.Offset(i);
+      const int at = now.FirstRow(i);
       H.middleCols<3>(at + kTheta) +=
           H.middleCols<3>(at + kPosition) * Hat(then_i.T_odom_body.t - now_i.T_odom_body.t) +
           H.middleCols<3>(at + kVelocity) * Hat(then_i.v_odom_body - now_i.v_odom_body);

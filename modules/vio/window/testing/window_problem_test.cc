@@ -293,10 +293,10 @@ WindowProblem FullStep(const WindowProblem& problem) {
     own.head(kCalibrationSize) = step.head(kCalibrationSize);
     for (size_t j = 0; j < landmark.rays.size(); ++j) {
       own.segment<kPoseSize>(elimination.RayColumn(j)) =
-          step.segment<kPoseSize>(problem.state.Offset(landmark.rays[j].frame));
+          step.segment<kPoseSize>(problem.state.FirstRow(landmark.rays[j].frame));
       if (elimination.stamps && problem.state.frames[landmark.rays[j].frame].has_stamp_error()) {
         own[elimination.RayColumn(j) + kPoseSize] =
-            step[problem.state.Offset(landmark.rays[j].frame) + kStampError];
+            step[problem.state.FirstRow(landmark.rays[j].frame) + kStampError];
       }
     }
     landmark.point.ray_rho += elimination.offset + elimination.gain * own;

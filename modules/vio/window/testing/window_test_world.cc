@@ -161,8 +161,8 @@ VectorXd RandomError(const WindowState& state, double sigma, uint64_t seed) {
 MatrixXd UnobservableDirections(const WindowState& state) {
   MatrixXd N = MatrixXd::Zero(state.size(), 4);
   for (int i = 0; i <= state.Newest(); ++i) {
-    N.block<3, 3>(state.Offset(i) + kPosition, 0).setIdentity();
-    N(state.Offset(i) + kTheta + 2, 3) = 1;
+    N.block<3, 3>(state.FirstRow(i) + kPosition, 0).setIdentity();
+    N(state.FirstRow(i) + kTheta + 2, 3) = 1;
   }
   return N;
 }
