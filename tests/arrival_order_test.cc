@@ -18,7 +18,7 @@ void WriteLog(const fs::path& path, const std::vector<int32_t>& agents) {
   LogFileWriter log(path.string());
   int64_t utime = 0;
   for (const int32_t agent : agents) {
-    for (const session::LoggedKeyframe& keyframe : session::ReadKeyframeLogOf(
+    for (const LoggedKeyframe& keyframe : ReadKeyframeLogOf(
              fs::path(PANGEA_SOURCE_DIR) / "logs" / "two_walks" / "session.lcm", agent)) {
       log.Write(utime++, keyframe.channel, keyframe.data);
     }

@@ -19,8 +19,8 @@ namespace fs = std::filesystem;
 void WriteThinLog(const fs::path& path) {
   LogFileWriter log(path.string());
   int64_t utime = 0;
-  for (const session::LoggedKeyframe& logged : session::ReadKeyframeLog(
-           fs::path(PANGEA_SOURCE_DIR) / "logs" / "two_walks" / "session.lcm")) {
+  for (const LoggedKeyframe& logged :
+       ReadKeyframeLog(fs::path(PANGEA_SOURCE_DIR) / "logs" / "two_walks" / "session.lcm")) {
     KeyframeMessage message{};
     ASSERT_TRUE(DecodeMessage(logged.data, &message));
     const Keyframe keyframe = *Parse(message).value;

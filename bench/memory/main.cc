@@ -35,10 +35,10 @@ constexpr int kFlippedBits = 20;  // of 256
 // Offset of agent ids, because two logs may have the same map ids.
 constexpr int32_t kAgentsOfALog = 100;
 
-std::vector<session::LoggedKeyframe> ReadAll(const std::vector<std::string>& logs) {
-  std::vector<session::LoggedKeyframe> all;
+std::vector<LoggedKeyframe> ReadAll(const std::vector<std::string>& logs) {
+  std::vector<LoggedKeyframe> all;
   for (size_t i = 0; i < logs.size(); ++i) {
-    for (session::LoggedKeyframe& keyframe : session::ReadKeyframeLog(logs[i])) {
+    for (LoggedKeyframe& keyframe : ReadKeyframeLog(logs[i])) {
       keyframe.id.map.agent_id += static_cast<int32_t>(kAgentsOfALog * i);
       all.push_back(std::move(keyframe));
     }
@@ -49,11 +49,11 @@ std::vector<session::LoggedKeyframe> ReadAll(const std::vector<std::string>& log
 // The n-th keyframe of the endless walk.
 class Walk {
  public:
-  explicit Walk(std::vector<session::LoggedKeyframe> stored) : stored_(std::move(stored)) {}
+  explicit Walk(std::vector<LoggedKeyframe> stored) : stored_(std::move(stored)) {}
 
   Keyframe At(int n) const {
     const int visit = n / static_cast<int>(stored_.size());
-    const session::LoggedKeyframe& logged = stored_[n % stored_.size()];
+    const LoggedKeyframe& logged = stored_[n % stored_.size()];
     KeyframeMessage message;
     DecodeMessage(logged.data, &message);
     Keyframe keyframe = *std::move(Parse(message).value);
@@ -70,7 +70,7 @@ class Walk {
   }
 
  private:
-  std::vector<session::LoggedKeyframe> stored_;
+  std::vector<LoggedKeyframe> stored_;
 };
 
 double ResidentBytes() {

@@ -24,7 +24,7 @@ Trajectory ReadTruth(const std::string& path) {
   return truth;
 }
 
-Keyframe Decode(const session::LoggedKeyframe& logged) {
+Keyframe Decode(const LoggedKeyframe& logged) {
   KeyframeMessage message;
   DecodeMessage(logged.data, &message);
   Parsed<Keyframe> parsed = Parse(message);
@@ -38,12 +38,12 @@ Keyframe Decode(const session::LoggedKeyframe& logged) {
 
 Input ReadInput(const std::vector<AgentInput>& agents) {
   Input input;
-  std::vector<std::vector<session::LoggedKeyframe>> logs;
+  std::vector<std::vector<LoggedKeyframe>> logs;
   for (const AgentInput& agent : agents) {
-    logs.push_back(session::ReadKeyframeLogOf(agent.keyframes, agent.id));
+    logs.push_back(ReadKeyframeLogOf(agent.keyframes, agent.id));
     input.truth[agent.id] = ReadTruth(agent.reference);
   }
-  for (const session::LoggedKeyframe& logged : session::Interleave(std::move(logs))) {
+  for (const LoggedKeyframe& logged : Interleave(std::move(logs))) {
     input.keyframes.push_back(Decode(logged));
   }
   return input;

@@ -150,8 +150,7 @@ std::optional<Scored> ScoredAt(const Retrieved& retrieved, size_t stage) {
 }  // namespace
 
 bool Retrieved::right_pose() const {
-  return landmarks > 0 && error_m <= session::kWrongTranslation_m &&
-         error_rad <= session::kWrongRotation_rad;
+  return landmarks > 0 && error_m <= kWrongTranslation_m && error_rad <= kWrongRotation_rad;
 }
 
 std::string ToString(Search search) { return search == Search::kOwnMap ? "own map" : "other maps"; }

@@ -24,7 +24,7 @@ constexpr double kPriorPoints = 8;
 constexpr double kOutlier = 2;  // standardised residual of a point
 constexpr int kIterations = 2;
 constexpr double kMaxChi2 = 16;  // of a single point, in the estimate of the roughness
-constexpr double kLeastRelativeSigma = 1e-6;
+constexpr double kMinRelativeSigma = 1e-6;
 constexpr double kMaxRelativeSigma = 0.15;
 
 struct Kriging {
@@ -49,8 +49,7 @@ Kriging Prepare(const Eigen::Vector2d& ray, const std::vector<SurfacePoint>& poi
   const double scale =
       Median(std::vector<double>(kriging.inverse_depth.begin(), kriging.inverse_depth.end()));
   for (Eigen::Index i = 0; i < count; ++i) {
-    const double sigma =
-        std::max(points[static_cast<size_t>(i)].sigma, kLeastRelativeSigma * scale);
+    const double sigma = std::max(points[static_cast<size_t>(i)].sigma, kMinRelativeSigma * scale);
     kriging.variance[i] = sigma * sigma;
   }
   const double half_square = 0.5 * std::pow(kRoughness * scale, 2);

@@ -12,7 +12,7 @@ namespace pangea::calibration {
 namespace {
 
 constexpr double kMadToSigma = 1.4826;
-constexpr double kLeastSigma_px = 0.02, kLeastMedian_px = 0.2;
+constexpr double kMinSigma_px = 0.02, kMinMedian_px = 0.2;
 constexpr double kTranslationStep = 1e-5;  // step of the numeric derivative
 // Information added for an undetermined direction of translation.
 constexpr double kDirectionDamping = 1e-3;
@@ -53,7 +53,7 @@ Translation RobustTranslation(const PairGeometry& geometry) {
   const Translation first = geometry.BestTranslation(weights, Translation::Zero());
   const Eigen::VectorXd absolute = geometry.Residuals(first).cwiseAbs();
   const double middle = Median(std::vector<double>(absolute.begin(), absolute.end()));
-  weights = (1 + (absolute / (2 * std::max(kLeastMedian_px, middle))).array().square()).inverse();
+  weights = (1 + (absolute / (2 * std::max(kMinMedian_px, middle))).array().square()).inverse();
   return geometry.BestTranslation(weights, first);
 }
 
@@ -266,7 +266,7 @@ Solver::Linearised Solver::Linearise(const State& state, const Prior& prior) con
     }
   }
   Linearised at;
-  at.sigma_px = std::max(kLeastSigma_px, kMadToSigma * Median(absolute));
+  at.sigma_px = std::max(kMinSigma_px, kMadToSigma * Median(absolute));
   const auto inliers = std::count_if(absolute.begin(), absolute.end(),
                                      [&at](double r) { return r < kInlierSigmas * at.sigma_px; });
   at.inlier_share = static_cast<double>(inliers) / static_cast<double>(absolute.size());

@@ -4,7 +4,7 @@
 
 namespace pangea {
 
-const ImuState* AdjustedGroup::Find(const KeyframeId& id) const {
+const KeyframeState* AdjustedGroup::Find(const KeyframeId& id) const {
   const auto known = keyframes.find(id);
   return known != keyframes.end() && known->second ? &*known->second : nullptr;
 }
@@ -13,15 +13,15 @@ bool AdjustedGroup::IsShapeOf(const MapPoses& state) const {
   constexpr double kSame_m = 1e-4;
   const Eigen::Vector3d* p_before = nullptr;
   const Eigen::Vector3d* p_state_before = nullptr;
-  for (const auto& [id, imu] : keyframes) {
-    if (!imu) {
+  for (const auto& [id, own] : keyframes) {
+    if (!own) {
       continue;
     }
     const auto posed = state.find(id);
     if (posed == state.end()) {
       return false;
     }
-    const Eigen::Vector3d& p = imu->T_odom_body.t;
+    const Eigen::Vector3d& p = own->T_map_body.t;
     const Eigen::Vector3d& p_state = posed->second.t;
     if (p_before != nullptr &&
         std::abs((p_state - *p_state_before).norm() - (p - *p_before).norm()) > kSame_m) {
@@ -33,9 +33,9 @@ bool AdjustedGroup::IsShapeOf(const MapPoses& state) const {
   return true;
 }
 
-ImuState MovedTo(const Rigid3& T_map_body, const ImuState& adjusted) {
-  const Eigen::Quaterniond rotation = T_map_body.q * adjusted.T_odom_body.q.conjugate();
-  return {T_map_body, rotation * adjusted.v_odom_body, adjusted.gyro_bias, adjusted.accel_bias};
+KeyframeState MovedTo(const Rigid3& T_map_body, const KeyframeState& adjusted) {
+  const Eigen::Quaterniond rotation = T_map_body.q * adjusted.T_map_body.q.conjugate();
+  return {T_map_body, rotation * adjusted.v_map_body, adjusted.gyro_bias, adjusted.accel_bias};
 }
 
 AdjustedGroup AfterAdjustment(const BaWorld& world, const MapPoses& state,
@@ -45,15 +45,15 @@ AdjustedGroup AfterAdjustment(const BaWorld& world, const MapPoses& state,
     after.cameras = before->cameras;
   }
   for (const auto& [id, T_map_body] : state) {
-    const ImuState* known = before == nullptr ? nullptr : before->Find(id);
-    std::optional<ImuState>& imu = after.keyframes[id];
+    const KeyframeState* known = before == nullptr ? nullptr : before->Find(id);
+    std::optional<KeyframeState>& own = after.keyframes[id];
     if (known != nullptr) {
-      imu = MovedTo(T_map_body, *known);
+      own = MovedTo(T_map_body, *known);
     }
   }
   for (const BaKeyframe& keyframe : world.keyframes) {
-    if (!keyframe.held) {
-      after.keyframes[keyframe.id] = keyframe.imu;
+    if (!keyframe.fixed) {
+      after.keyframes[keyframe.id] = keyframe.state;
     }
     after.cameras[keyframe.id.map] = world.cameras[keyframe.camera];
   }

@@ -14,6 +14,11 @@ Eigen::Map<RowMajor<kRows, kColumns>> AsMatrix(double* jacobian) {
   return Eigen::Map<RowMajor<kRows, kColumns>>(jacobian);
 }
 
+// The residual is the same in any frame whose z axis points up.
+ImuState InOdom(const KeyframeState& state) {
+  return {state.T_map_body, state.v_map_body, state.gyro_bias, state.accel_bias};
+}
+
 // Converts J from the errors of the inertial residual (right-invariant) to those of the blocks: a
 // rotation error also rotates position and velocity, e_p = dp + p x dtheta.
 RowMajor<15, 7> PoseJacobian(const Eigen::Matrix<double, 15, 15>& J, const ImuState& state) {
@@ -40,7 +45,7 @@ void PoseToBlock(const Rigid3& pose, double* block) {
   t = pose.t;
 }
 
-ImuState StateFromBlocks(const double* pose, const double* motion) {
+KeyframeState StateFromBlocks(const double* pose, const double* motion) {
   return {PoseFromBlock(pose), Eigen::Vector3d::Map(motion), Eigen::Vector3d::Map(motion + 3),
           Eigen::Vector3d::Map(motion + 6)};
 }
@@ -50,8 +55,8 @@ PreintegrationFactor::PreintegrationFactor(const Preintegration& measured, const
 
 bool PreintegrationFactor::Evaluate(double const* const* parameters, double* residuals,
                                     double** jacobians) const {
-  const ImuState from = StateFromBlocks(parameters[0], parameters[1]);
-  const ImuState to = StateFromBlocks(parameters[2], parameters[3]);
+  const ImuState from = InOdom(StateFromBlocks(parameters[0], parameters[1]));
+  const ImuState to = InOdom(StateFromBlocks(parameters[2], parameters[3]));
   const InertialResidual residual = ComputeInertialResidual(measured_, from, to);
   Eigen::Map<Eigen::Matrix<double, 15, 1>> r(residuals);
   r = sqrt_info_ * residual.r;

@@ -12,15 +12,16 @@
 
 #include "core/imu/imu_factor.h"
 #include "core/least_squares/edge_residual.h"
+#include "global_ba/ba_world.h"
 
 namespace pangea {
 
-using MotionBlock = Eigen::Matrix<double, 9, 1>;
+using SpeedBiasBlock = Eigen::Matrix<double, 9, 1>;
 
 Rigid3 PoseFromBlock(const double* block);
 void PoseToBlock(const Rigid3& pose, double* block);
 
-ImuState StateFromBlocks(const double* pose, const double* motion);
+KeyframeState StateFromBlocks(const double* pose, const double* motion);
 
 // The preintegrated motion between two keyframes, with random walks of the biases
 // (core/imu/imu_factor.h). Blocks: pose and motion of the first keyframe, pose and motion of the

@@ -18,14 +18,14 @@ using Eigen::VectorXd;
 // Pose and motion together, displaced by an offset in their tangents.
 struct Blocks {
   Rigid3 pose;
-  MotionBlock motion;
+  SpeedBiasBlock motion;
 
-  explicit Blocks(const ImuState& imu) : pose(imu.T_odom_body) {
-    motion << imu.v_odom_body, imu.gyro_bias, imu.accel_bias;
+  explicit Blocks(const KeyframeState& state) : pose(state.T_map_body) {
+    motion << state.v_map_body, state.gyro_bias, state.accel_bias;
   }
   void Write(const VectorXd& offset, double* pose_block, double* motion_block) const {
     PoseToBlock(pose.Plus(offset.head<6>()), pose_block);
-    Eigen::Map<MotionBlock> moved(motion_block);
+    Eigen::Map<SpeedBiasBlock> moved(motion_block);
     moved = motion + offset.tail<9>();
   }
 };
@@ -59,7 +59,7 @@ TEST(PreintegrationFactor, DerivativesMatchDifferencesInEveryBlock) {
   const BaTestWorld world = MakeBaTestWorld({.agents = 1, .keyframes = 8, .landmarks = 1});
   for (size_t i = 1; i < world.start.keyframes.size(); ++i) {
     const BaKeyframe& to = world.start.keyframes[i];
-    const Blocks first(world.start.keyframes[i - 1].imu), second(to.imu);
+    const Blocks first(world.start.keyframes[i - 1].state), second(to.state);
     const PreintegrationFactor factor(*to.preintegration, ImuNoise{});
     double pose_a[7], motion_a[9], pose_b[7], motion_b[9];
     const auto evaluate = [&](const VectorXd& offset, double** jacobians) {
@@ -99,8 +99,8 @@ TEST(PreintegrationFactor, IsChiSquaredAtTheTruth) {
           continue;
         }
         double pose_a[7], motion_a[9], pose_b[7], motion_b[9];
-        Blocks(truth.keyframes[to.previous].imu).Write(VectorXd::Zero(15), pose_a, motion_a);
-        Blocks(to.imu).Write(VectorXd::Zero(15), pose_b, motion_b);
+        Blocks(truth.keyframes[to.previous].state).Write(VectorXd::Zero(15), pose_a, motion_a);
+        Blocks(to.state).Write(VectorXd::Zero(15), pose_b, motion_b);
         const double* const blocks[] = {pose_a, motion_a, pose_b, motion_b};
         VectorXd r(15);
         EXPECT_TRUE(PreintegrationFactor(*to.preintegration, ImuNoise{})

@@ -21,8 +21,8 @@
 // outliers, which are dropped; the second, with Huber's loss, estimates the rest. Position and yaw
 // of the whole are unobservable: damping keeps them at their initial values.
 //
-// Fixed variables (`held`) keep their values, and the cost is minimised over the others. So a world
-// at its minimum stays there, whichever variables are fixed.
+// Fixed variables (`fixed`) keep their values, and the cost is minimised over the others. So a
+// world at its minimum stays there, whichever variables are fixed.
 //
 // The work is done in pieces of a few iterations, so that the caller can handle messages in between
 // or abandon it. One thread, no clock: the same world gives the same bytes.

@@ -27,8 +27,8 @@ BaOptions ToTheEnd() {
 
 BaWorld WithoutBiases(BaWorld world) {
   for (BaKeyframe& keyframe : world.keyframes) {
-    keyframe.imu.gyro_bias.setZero();
-    keyframe.imu.accel_bias.setZero();
+    keyframe.state.gyro_bias.setZero();
+    keyframe.state.accel_bias.setZero();
   }
   return world;
 }
@@ -141,7 +141,7 @@ TEST(BaProblem, TheSameStartGivesTheSameBytes) {
   const BaTestWorld world = MakeBaTestWorld({.edge_sigma_m = 0.01});
   const BaWorld a = Solved(world.start), b = Solved(world.start);
   for (size_t i = 0; i < a.keyframes.size(); ++i) {
-    EXPECT_EQ(a.keyframes[i].imu.T_odom_body.t, b.keyframes[i].imu.T_odom_body.t);
+    EXPECT_EQ(a.keyframes[i].state.T_map_body.t, b.keyframes[i].state.T_map_body.t);
   }
 }
 
@@ -196,23 +196,23 @@ TEST(BaProblem, WhatMovesReturnsToTheMinimumBesideWhatIsHeld) {
   std::mt19937_64 rng(1);
   std::normal_distribution<double> normal(0, 0.02);
   for (BaCamera& camera : part.cameras) {
-    camera.held = true;
+    camera.fixed = true;
   }
   for (BaKeyframe& keyframe : part.keyframes) {
-    keyframe.held = keyframe.id.seq % 10 < 5;
-    if (!keyframe.held) {
-      keyframe.imu.T_odom_body.t.x() += normal(rng);
-      keyframe.imu.v_odom_body.y() += normal(rng);
-      keyframe.imu.accel_bias.setZero();
+    keyframe.fixed = keyframe.id.seq % 10 < 5;
+    if (!keyframe.fixed) {
+      keyframe.state.T_map_body.t.x() += normal(rng);
+      keyframe.state.v_map_body.y() += normal(rng);
+      keyframe.state.accel_bias.setZero();
     }
   }
   const BaWorld found = Solved(part, to_the_end);
   for (size_t i = 0; i < found.keyframes.size(); ++i) {
-    const ImuState &imu = found.keyframes[i].imu, &expected = solved.keyframes[i].imu;
-    const double tolerance = found.keyframes[i].held ? 0 : 1e-4;
-    EXPECT_LE((imu.T_odom_body.t - expected.T_odom_body.t).norm(), tolerance);
-    EXPECT_LE((imu.v_odom_body - expected.v_odom_body).norm(), 10 * tolerance);
-    EXPECT_LE((imu.accel_bias - expected.accel_bias).norm(), 10 * tolerance);
+    const KeyframeState &state = found.keyframes[i].state, &expected = solved.keyframes[i].state;
+    const double tolerance = found.keyframes[i].fixed ? 0 : 1e-4;
+    EXPECT_LE((state.T_map_body.t - expected.T_map_body.t).norm(), tolerance);
+    EXPECT_LE((state.v_map_body - expected.v_map_body).norm(), 10 * tolerance);
+    EXPECT_LE((state.accel_bias - expected.accel_bias).norm(), 10 * tolerance);
   }
 }
 

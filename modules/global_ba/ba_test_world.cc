@@ -84,7 +84,7 @@ class Maker {
         }
         keyframe.edge = Edge(flight.Pose(t - options_.step_s).Inverse() * flight.Pose(t));
       }
-      keyframe.imu = {flight.Pose(t), flight.Velocity(t), gyro_bias, accel_bias};
+      keyframe.state = {flight.Pose(t), flight.Velocity(t), gyro_bias, accel_bias};
     }
   }
 
@@ -128,7 +128,7 @@ class Maker {
   void See(int index) {
     const BaKeyframe& keyframe = world_.keyframes[index];
     const CameraModel camera = EurocTestCamera();
-    const Rigid3 T_cam_map = (keyframe.imu.T_odom_body * camera.T_body_cam).Inverse();
+    const Rigid3 T_cam_map = (keyframe.state.T_map_body * camera.T_body_cam).Inverse();
     const double sigma = options_.pixel_sigma * camera.PixelAngle();
     std::uniform_real_distribution<double> uniform(0, 1);
     for (int i = 0; i < static_cast<int>(world_.landmarks.size()); ++i) {
@@ -151,13 +151,13 @@ class Maker {
     BaWorld start = world_;
     const double scale = 1 + options_.scale_error;
     for (BaKeyframe& keyframe : start.keyframes) {
-      ImuState& imu = keyframe.imu;
-      imu.T_odom_body.t = scale * imu.T_odom_body.t + RandomVector(rng_, options_.start_sigma_m);
-      imu.T_odom_body.q =
-          ExpSo3(RandomVector(rng_, 0.1 * options_.start_sigma_m)) * imu.T_odom_body.q;
-      imu.v_odom_body = scale * imu.v_odom_body + RandomVector(rng_, options_.start_sigma_m);
-      imu.gyro_bias.setZero();
-      imu.accel_bias.setZero();
+      KeyframeState& state = keyframe.state;
+      state.T_map_body.t = scale * state.T_map_body.t + RandomVector(rng_, options_.start_sigma_m);
+      state.T_map_body.q =
+          ExpSo3(RandomVector(rng_, 0.1 * options_.start_sigma_m)) * state.T_map_body.q;
+      state.v_map_body = scale * state.v_map_body + RandomVector(rng_, options_.start_sigma_m);
+      state.gyro_bias.setZero();
+      state.accel_bias.setZero();
     }
     for (Vector3d& landmark : start.landmarks) {
       landmark = scale * landmark + RandomVector(rng_, options_.start_sigma_m);
@@ -183,10 +183,10 @@ BaTestMessages MessagesOf(const BaTestWorld& world) {
     keyframe.id = start.id;
     keyframe.utime = start.utime;
     keyframe.camera = EurocTestCamera();
-    keyframe.T_odom_body = start.imu.T_odom_body;
-    keyframe.v_odom_body = start.imu.v_odom_body;
+    keyframe.T_odom_body = start.state.T_map_body;
+    keyframe.v_odom_body = start.state.v_map_body;
     if (start.previous >= 0) {
-      const Rigid3& T_previous = world.start.keyframes[start.previous].imu.T_odom_body;
+      const Rigid3& T_previous = world.start.keyframes[start.previous].state.T_map_body;
       const BaEdge of_start{T_previous.Inverse() * keyframe.T_odom_body,
                             // The start's error between successive keyframes
                             1e-3 * Matrix6d::Identity()};
@@ -234,13 +234,13 @@ BaTestMessages MessagesOf(const BaTestWorld& world) {
 }
 
 double WorstError(const BaWorld& world, const BaWorld& truth) {
-  const Rigid3& first = world.keyframes[0].imu.T_odom_body;
-  const Rigid3& true_first = truth.keyframes[0].imu.T_odom_body;
+  const Rigid3& first = world.keyframes[0].state.T_map_body;
+  const Rigid3& true_first = truth.keyframes[0].state.T_map_body;
   const Eigen::Quaterniond rotation = YawRotation(YawOf(true_first.q * first.q.conjugate()));
   double worst = 0;
   for (size_t i = 0; i < world.keyframes.size(); ++i) {
-    const Vector3d p = rotation * (world.keyframes[i].imu.T_odom_body.t - first.t);
-    worst = std::max(worst, (p - (truth.keyframes[i].imu.T_odom_body.t - true_first.t)).norm());
+    const Vector3d p = rotation * (world.keyframes[i].state.T_map_body.t - first.t);
+    worst = std::max(worst, (p - (truth.keyframes[i].state.T_map_body.t - true_first.t)).norm());
   }
   return worst;
 }
@@ -249,8 +249,9 @@ double PathLength(const BaWorld& world) {
   double length = 0;
   for (const BaKeyframe& keyframe : world.keyframes) {
     if (keyframe.previous >= 0) {
-      length += (keyframe.imu.T_odom_body.t - world.keyframes[keyframe.previous].imu.T_odom_body.t)
-                    .norm();
+      length +=
+          (keyframe.state.T_map_body.t - world.keyframes[keyframe.previous].state.T_map_body.t)
+              .norm();
     }
   }
   return length;

@@ -10,6 +10,13 @@
 
 namespace pangea {
 
+struct KeyframeState {
+  Rigid3 T_map_body;
+  Eigen::Vector3d v_map_body = Eigen::Vector3d::Zero();  // m/s
+  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();   // rad/s
+  Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();  // m/s^2
+};
+
 struct BaEdge {
   Rigid3 T_previous_this;
   Matrix6d covariance = Matrix6d::Identity();
@@ -19,14 +26,14 @@ struct BaKeyframe {
   KeyframeId id;
   int64_t utime = 0;
   int camera = 0;  // index into BaWorld::cameras
-  ImuState imu;    // "odom" is here the group's map frame
+  KeyframeState state;
   // Preintegration and odometry edge from keyframe `previous` of the world to this one; either may
   // be missing. -1 and empty at the start of a map or of a part of it.
   int previous = -1;
   std::optional<Preintegration> preintegration;
   std::optional<BaEdge> edge;
   double unknown_scale = 0;  // sigma of its map's scale; 0 for a metric map
-  bool held = false;         // the keyframe's variables are fixed
+  bool fixed = false;        // the keyframe's variables are fixed
 };
 
 // Variables shared by the keyframes of a map.
@@ -34,7 +41,7 @@ struct BaCamera {
   Rigid3 T_body_cam;
   Rigid3 T_body_cam_prior = T_body_cam;  // the odometry's estimate
   double edge_log_scale = 0;  // the map's edges are too long by the factor exp(edge_log_scale)
-  bool held = false;          // fixed; else edge_log_scale starts at zero
+  bool fixed = false;         // fixed; else edge_log_scale starts at zero
 };
 
 struct BaObservation {

@@ -46,8 +46,8 @@ MapPoses PosesAfter(const AdjustedGroup& adjusted, const MapPoses& before) {
   MapPoses after;
   Rigid3 T_after_before;
   for (const auto& [id, T_map_body] : before) {
-    if (const ImuState* imu = adjusted.Find(id)) {
-      T_after_before = imu->T_odom_body * T_map_body.Inverse();
+    if (const KeyframeState* state = adjusted.Find(id)) {
+      T_after_before = state->T_map_body * T_map_body.Inverse();
     }
     after[id] = T_after_before * T_map_body;
   }
@@ -67,7 +67,7 @@ double LargestShift(const BaWorld& world, const AdjustedGroup& before, const Map
   double largest = 0;
   for (const BaKeyframe& keyframe : world.keyframes) {
     if (before.Find(keyframe.id) != nullptr) {
-      const double shift = (keyframe.imu.T_odom_body.t - poses.at(keyframe.id).t).norm();
+      const double shift = (keyframe.state.T_map_body.t - poses.at(keyframe.id).t).norm();
       largest = std::max(largest, shift);
     }
   }
@@ -258,7 +258,7 @@ std::vector<KeyframePair> GlobalBa::TakeNewPairs(const MapState& state, const Ma
 }
 
 std::unique_ptr<BaProblem> GlobalBa::Whole(const MapState& state, const MapPoses& poses) {
-  std::vector<MatchedPlaces> places;
+  std::vector<MatchedPair> places;
   for (const MapId& map : state.maps) {
     for (const KeyframePair& pair : pairs_.OfMap(map)) {
       AddPlace(pair, &places);
@@ -271,11 +271,11 @@ std::unique_ptr<BaProblem> GlobalBa::Local(const MapPoses& poses) {
   const AdjustedGroup& adjusted = refined_.at(work_->state->group).adjusted;
   const LocalPart part = ChooseLocalPart(poses, adjusted, pairs_, work_->new_pairs,
                                          options_.local.max_neighbours, &store_);
-  std::vector<MatchedPlaces> places;
-  for (const std::set<KeyframeId>* keyframes : {&part.moving, &part.held}) {
+  std::vector<MatchedPair> places;
+  for (const std::set<KeyframeId>* keyframes : {&part.moving, &part.fixed}) {
     for (const KeyframeId& id : *keyframes) {
       for (const KeyframePair& pair : pairs_.OfQuery(id)) {
-        if (part.moving.contains(pair.second) || part.held.contains(pair.second)) {
+        if (part.moving.contains(pair.second) || part.fixed.contains(pair.second)) {
           AddPlace(pair, &places);
         }
       }
@@ -285,7 +285,7 @@ std::unique_ptr<BaProblem> GlobalBa::Local(const MapPoses& poses) {
                                      options_.ba);
 }
 
-void GlobalBa::AddPlace(const KeyframePair& pair, std::vector<MatchedPlaces>* places) {
+void GlobalBa::AddPlace(const KeyframePair& pair, std::vector<MatchedPair>* places) {
   const auto corners = matched_.find(pair);
   const auto record =
       corners == matched_.end() ? std::nullopt : corners->second.Bytes(records_.get());
@@ -316,8 +316,8 @@ MapState GlobalBa::Finish() {
     known.adjusted = AfterAdjustment(world, poses, nullptr);
   }
   for (const auto& [id, utime, told] : std::exchange(refined.keyframes, {})) {
-    if (const ImuState* imu = known.adjusted.Find(id)) {
-      refined.keyframes.push_back({id, utime, imu->T_odom_body});
+    if (const KeyframeState* state = known.adjusted.Find(id)) {
+      refined.keyframes.push_back({id, utime, state->T_map_body});
     }
   }
   std::ranges::sort(refined.keyframes, {}, &KeyframePose::id);

@@ -27,9 +27,9 @@
 #include <vector>
 
 #include "core/group_states.h"
+#include "core/keyframe_store.h"
 #include "core/record_store.h"
 #include "core/server_messages.h"
-#include "core/submap_store.h"
 #include "global_ba/ba_problem.h"
 #include "global_ba/group_world.h"
 #include "global_ba/local_part.h"
@@ -62,7 +62,7 @@ class GlobalBa {
 
   // The record of a keyframe, as it is stored in `records`.
   static std::vector<uint8_t> RecordOf(const Keyframe& keyframe) {
-    return SubmapStore::RecordOf(keyframe, kStore);
+    return KeyframeStore::RecordOf(keyframe, kStore);
   }
   // Saves its input, except states. Restore returns false, and changes nothing, if the bytes are
   // not those of a GlobalBa.
@@ -113,7 +113,7 @@ class GlobalBa {
     MapPoses begin;  // poses at the start of this pass
     std::unique_ptr<BaProblem> problem;
   };
-  static constexpr SubmapStoreOptions kStore{.keep_preintegration = true};
+  static constexpr KeyframeStoreOptions kStore{.keep_preintegration = true};
   static Basis BasisOf(const MapState& state);
   static constexpr size_t kMaxMatched = 200'000;  // candidates; further ones are not used
 
@@ -125,13 +125,13 @@ class GlobalBa {
   std::vector<KeyframePair> TakeNewPairs(const MapState& state, const MapPoses& poses);
   std::unique_ptr<BaProblem> Whole(const MapState& state, const MapPoses& poses);
   std::unique_ptr<BaProblem> Local(const MapPoses& poses);
-  void AddPlace(const KeyframePair& pair, std::vector<MatchedPlaces>* places);
+  void AddPlace(const KeyframePair& pair, std::vector<MatchedPair>* places);
   void DropIfAbout(const MapId& map);
   MapState Finish();
 
   GlobalBaOptions options_;
   std::shared_ptr<RecordStore> records_;
-  SubmapStore store_;
+  KeyframeStore store_;
   std::map<KeyframePair, Record> matched_;  // matched corners, from place recognition
   MatchedPairs pairs_;
   std::set<KeyframePair> new_pairs_;  // matched pairs that no refinement contains

@@ -40,7 +40,7 @@ struct Server {
 BaWorld Moved(BaWorld world, const MapState& refined) {
   for (size_t i = 0; i < world.keyframes.size(); ++i) {
     EXPECT_EQ(world.keyframes[i].id, refined.keyframes[i].id);
-    world.keyframes[i].imu.T_odom_body = refined.keyframes[i].T_map_body;
+    world.keyframes[i].state.T_map_body = refined.keyframes[i].T_map_body;
   }
   return world;
 }
@@ -79,8 +79,8 @@ TEST(GlobalBa, AnOdometryThatCallsItselfExactDoesNoHarm) {
     for (size_t i = 1; i < messages.keyframes.size(); ++i) {
       Keyframe& keyframe = messages.keyframes[i];
       if (keyframe.edge && keyframe.id.map.agent_id == 2) {
-        keyframe.edge->T_from_this = world.truth.keyframes[i - 1].imu.T_odom_body.Inverse() *
-                                     world.truth.keyframes[i].imu.T_odom_body;
+        keyframe.edge->T_from_this = world.truth.keyframes[i - 1].state.T_map_body.Inverse() *
+                                     world.truth.keyframes[i].state.T_map_body;
         keyframe.edge->covariance = variance * Matrix6d::Identity();
       }
     }

@@ -19,16 +19,16 @@ BaKeyframe Start(const Keyframe& keyframe, const Rigid3& T_map_body) {
   start.id = keyframe.id;
   start.utime = keyframe.utime;
   const Eigen::Quaterniond q_map_odom = T_map_body.q * keyframe.T_odom_body.q.conjugate();
-  start.imu = {T_map_body, q_map_odom * keyframe.v_odom_body, keyframe.gyro_bias,
-               keyframe.accel_bias};
+  start.state = {T_map_body, q_map_odom * keyframe.v_odom_body, keyframe.gyro_bias,
+                 keyframe.accel_bias};
   return start;
 }
 
 // No odometry is more accurate, whatever it says: such an edge would outweigh the rounding of all
 // else.
 Matrix6d Believable(Matrix6d covariance) {
-  constexpr double kLeastSigma = 1e-5;  // m, rad
-  covariance.diagonal() = covariance.diagonal().cwiseMax(kLeastSigma * kLeastSigma);
+  constexpr double kMinSigma = 1e-5;  // m, rad
+  covariance.diagonal() = covariance.diagonal().cwiseMax(kMinSigma * kMinSigma);
   return covariance;
 }
 
@@ -52,7 +52,7 @@ auto NumOfMap(const Keyframes& keyframes, const MapId& map) {
 // Builds a world in steps: keyframes, then which are fixed, then landmarks.
 class Maker {
  public:
-  explicit Maker(SubmapStore* store) : store_(store) {}
+  explicit Maker(KeyframeStore* store) : store_(store) {}
 
   // Call in ascending order of ids.
   void Add(const KeyframeId& id, const Rigid3& T_map_body) {
@@ -86,21 +86,21 @@ class Maker {
   void StartFrom(const AdjustedGroup& adjusted, const MapPoses& state, const LocalPart& part) {
     for (size_t i = 0; i < world_.keyframes.size(); ++i) {
       BaKeyframe& keyframe = world_.keyframes[i];
-      keyframe.held = !part.moving.contains(keyframe.id);
-      if (const ImuState* known = adjusted.Find(keyframe.id)) {
-        keyframe.imu = MovedTo(keyframe.imu.T_odom_body, *known);
+      keyframe.fixed = !part.moving.contains(keyframe.id);
+      if (const KeyframeState* known = adjusted.Find(keyframe.id)) {
+        keyframe.state = MovedTo(keyframe.state.T_map_body, *known);
         cull_[i] = Cull::kNever;
-      } else if (keyframe.held) {
+      } else if (keyframe.fixed) {
         cull_[i] = Cull::kAlways;
       }
     }
     HoldCameras(adjusted, state, part);
   }
 
-  BaWorld Finish(const std::vector<MatchedPlaces>& places) {
+  BaWorld Finish(const std::vector<MatchedPair>& places) {
     SetUnknownScales(scale_sigmas_, &world_);
     std::vector<MatchedKeyframes> matches;
-    for (const MatchedPlaces& place : places) {
+    for (const MatchedPair& place : places) {
       const auto query = index_.find(place.query);
       const auto match = index_.find(place.match);
       if (query != index_.end() && match != index_.end()) {
@@ -124,15 +124,15 @@ class Maker {
       const MapId& map = keyframe.id.map;
       const auto known = adjusted.cameras.find(map);
       BaCamera& camera = world_.cameras[keyframe.camera];
-      if (known != adjusted.cameras.end() && !camera.held &&
+      if (known != adjusted.cameras.end() && !camera.fixed &&
           2 * NumOfMap(part.moving, map) < NumOfMap(state, map)) {
         camera = known->second;
-        camera.held = true;
+        camera.fixed = true;
       }
     }
   }
 
-  SubmapStore* store_;
+  KeyframeStore* store_;
   BaWorld world_;
   std::vector<std::vector<double>> scale_sigmas_;  // by camera
   std::vector<Cull> cull_;                         // by keyframe
@@ -143,7 +143,7 @@ class Maker {
 void DropWhatIsHeld(BaWorld* world) {
   std::vector<bool> moves(world->landmarks.size(), false);
   for (const BaObservation& seen : world->observations) {
-    moves[seen.landmark] = moves[seen.landmark] || !world->keyframes[seen.keyframe].held;
+    moves[seen.landmark] = moves[seen.landmark] || !world->keyframes[seen.keyframe].fixed;
   }
   std::erase_if(world->observations,
                 [&](const BaObservation& seen) { return !moves[seen.landmark]; });
@@ -152,8 +152,8 @@ void DropWhatIsHeld(BaWorld* world) {
 
 }  // namespace
 
-BaWorld MakeGroupWorld(const MapPoses& state, const std::vector<MatchedPlaces>& places,
-                       SubmapStore* store) {
+BaWorld MakeGroupWorld(const MapPoses& state, const std::vector<MatchedPair>& places,
+                       KeyframeStore* store) {
   Maker maker(store);
   for (const auto& [id, T_map_body] : state) {
     maker.Add(id, T_map_body);
@@ -162,9 +162,9 @@ BaWorld MakeGroupWorld(const MapPoses& state, const std::vector<MatchedPlaces>& 
 }
 
 BaWorld MakeLocalWorld(const MapPoses& state, const LocalPart& part, const AdjustedGroup& adjusted,
-                       const std::vector<MatchedPlaces>& places, SubmapStore* store) {
+                       const std::vector<MatchedPair>& places, KeyframeStore* store) {
   Maker maker(store);
-  std::set<KeyframeId> all = part.held;
+  std::set<KeyframeId> all = part.fixed;
   all.insert(part.moving.begin(), part.moving.end());
   for (const KeyframeId& id : all) {
     maker.Add(id, state.at(id));

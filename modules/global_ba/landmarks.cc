@@ -25,9 +25,9 @@ struct Track {
 
 class Builder {
  public:
-  Builder(SubmapStore* store, BaWorld* world) : store_(store), world_(world) {
+  Builder(KeyframeStore* store, BaWorld* world) : store_(store), world_(world) {
     for (const BaKeyframe& keyframe : world->keyframes) {
-      T_map_cam_.push_back(keyframe.imu.T_odom_body * world->cameras[keyframe.camera].T_body_cam);
+      T_map_cam_.push_back(keyframe.state.T_map_body * world->cameras[keyframe.camera].T_body_cam);
     }
   }
 
@@ -148,7 +148,7 @@ class Builder {
            (seen.sqrt_info * (p_cam.hnormalized() - seen.ray)).norm() < kMaxStartSigmas;
   }
 
-  SubmapStore* store_;
+  KeyframeStore* store_;
   BaWorld* world_;
   std::vector<Rigid3> T_map_cam_;
   std::map<TrackId, Track> tracks_;
@@ -158,7 +158,7 @@ class Builder {
 
 }  // namespace
 
-void AddLandmarks(const std::vector<MatchedKeyframes>& matches, SubmapStore* store,
+void AddLandmarks(const std::vector<MatchedKeyframes>& matches, KeyframeStore* store,
                   BaWorld* world) {
   Builder builder(store, world);
   builder.AddTracks();

@@ -16,7 +16,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/submap_store.h"
+#include "core/keyframe_store.h"
 #include "global_ba/ba_problem.h"
 
 namespace pangea {
@@ -35,6 +35,7 @@ struct MatchedKeyframes {
 
 // Adds landmarks and observations to a world with keyframes. `store` has the same keyframes; they
 // are read one after another, so that not all are in memory at once.
-void AddLandmarks(const std::vector<MatchedKeyframes>& matches, SubmapStore* store, BaWorld* world);
+void AddLandmarks(const std::vector<MatchedKeyframes>& matches, KeyframeStore* store,
+                  BaWorld* world);
 
 }  // namespace pangea

@@ -36,7 +36,7 @@ struct Group {
     }
   }
   BaWorld World(int max_views = 256) const {
-    SubmapStore store({.max_views = max_views, .keep_preintegration = true});
+    KeyframeStore store({.max_views = max_views, .keep_preintegration = true});
     for (const Keyframe& keyframe : messages.keyframes) {
       store.Add(keyframe);
     }
@@ -45,7 +45,7 @@ struct Group {
 
   BaTestWorld truth;
   BaTestMessages messages;
-  std::vector<MatchedPlaces> places;
+  std::vector<MatchedPair> places;
 };
 
 // Number of landmarks that keyframes of both agents see.
@@ -155,11 +155,11 @@ TEST(Landmarks, AMatchOfTwoTracksCountsOnce) {
 TEST(Landmarks, ACornerSeesATrackOnceHoweverManyKeyframesItIsMatchedWith) {
   Group group;
   std::vector<Keyframe>& keyframes = group.messages.keyframes;
-  std::vector<MatchedPlaces> beside;
+  std::vector<MatchedPair> beside;
   size_t offered_again = 0;
-  for (const MatchedPlaces& place : group.places) {
+  for (const MatchedPair& place : group.places) {
     const int neighbour = place.match.seq > 0 ? place.match.seq - 1 : 1;
-    MatchedPlaces& other = beside.emplace_back(place);
+    MatchedPair& other = beside.emplace_back(place);
     other.match = keyframes[neighbour].id;
     other.corners.clear();
     for (const auto& [corner, unused] : place.corners) {
@@ -197,7 +197,7 @@ TEST(Landmarks, ATrackThatIsNotOnePointIsLeftOut) {
 TEST(Landmarks, AWrongMatchIsLeftOut) {
   Group group;
   const size_t right = group.World().observations.size();
-  for (MatchedPlaces& place : group.places) {
+  for (MatchedPair& place : group.places) {
     for (size_t i = 0; i + 1 < place.corners.size(); i += 2) {
       std::swap(place.corners[i].second, place.corners[i + 1].second);
     }
@@ -207,7 +207,7 @@ TEST(Landmarks, AWrongMatchIsLeftOut) {
   for (const BaObservation& seen : world.observations) {
     const BaKeyframe& keyframe = world.keyframes[seen.keyframe];
     const Eigen::Vector3d p_cam =
-        (keyframe.imu.T_odom_body * world.cameras[keyframe.camera].T_body_cam).Inverse() *
+        (keyframe.state.T_map_body * world.cameras[keyframe.camera].T_body_cam).Inverse() *
         world.landmarks[seen.landmark];
     EXPECT_LT((seen.sqrt_info * (p_cam.hnormalized() - seen.ray)).norm(), kMaxStartSigmas);
   }
@@ -229,9 +229,9 @@ TEST(GroupWorld, IsTheGraphsPosesWithTheOdometrysMotion) {
   const BaWorld world = group.World();
   ASSERT_EQ(world.keyframes.size(), 2u * kKeyframes);
   for (size_t i = 0; i < world.keyframes.size(); ++i) {
-    const ImuState& got = world.keyframes[i].imu;
-    const ImuState& odometry = group.truth.start.keyframes[i].imu;
-    EXPECT_LT((got.v_odom_body - rotated.q * odometry.v_odom_body).norm(), 1e-9);
+    const KeyframeState& got = world.keyframes[i].state;
+    const KeyframeState& odometry = group.truth.start.keyframes[i].state;
+    EXPECT_LT((got.v_map_body - rotated.q * odometry.v_map_body).norm(), 1e-9);
     EXPECT_EQ(world.keyframes[i].preintegration.has_value(), i % kKeyframes != 0);
   }
 }

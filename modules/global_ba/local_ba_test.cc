@@ -135,7 +135,7 @@ double ErrorOfNew(const MapState& refined, const BaWorld& truth) {
     if (keyframe.id.map.agent_id == 3 && found.contains(keyframe.id)) {
       const BaKeyframe& first = truth.keyframes.front();
       const Eigen::Vector3d p = found.at(first.id).Inverse() * found.at(keyframe.id).t;
-      const Eigen::Vector3d p_true = first.imu.T_odom_body.Inverse() * keyframe.imu.T_odom_body.t;
+      const Eigen::Vector3d p_true = first.state.T_map_body.Inverse() * keyframe.state.T_map_body.t;
       largest = std::max(largest, (p - p_true).norm());
     }
   }

@@ -10,7 +10,7 @@ namespace {
 class Chooser {
  public:
   Chooser(const MapPoses& state, const AdjustedGroup& adjusted, const MatchedPairs& pairs,
-          SubmapStore* store)
+          KeyframeStore* store)
       : state_(state), adjusted_(adjusted), pairs_(pairs), store_(store) {}
 
   LocalPart Choose(const std::vector<KeyframePair>& new_pairs, int max_neighbours) {
@@ -34,9 +34,9 @@ class Chooser {
       newest = Neighbours(newest, part.moving, max_moving - part.moving.size());
       part.moving.insert(newest.begin(), newest.end());
     }
-    part.held = Around(part.moving);
+    part.fixed = Around(part.moving);
     for (const KeyframeId& id : part.moving) {
-      part.held.erase(id);
+      part.fixed.erase(id);
     }
     return part;
   }
@@ -153,7 +153,7 @@ class Chooser {
   const MapPoses& state_;
   const AdjustedGroup& adjusted_;
   const MatchedPairs& pairs_;
-  SubmapStore* store_;
+  KeyframeStore* store_;
   std::set<KeyframeId> new_;
   std::map<KeyframeId, std::vector<int32_t>> landmarks_;
   std::map<KeyframeId, Shared> along_;
@@ -163,7 +163,7 @@ class Chooser {
 
 LocalPart ChooseLocalPart(const MapPoses& state, const AdjustedGroup& adjusted,
                           const MatchedPairs& pairs, const std::vector<KeyframePair>& new_pairs,
-                          int max_neighbours, SubmapStore* store) {
+                          int max_neighbours, KeyframeStore* store) {
   return Chooser(state, adjusted, pairs, store).Choose(new_pairs, max_neighbours);
 }
 

@@ -9,7 +9,7 @@
 #include <set>
 #include <vector>
 
-#include "core/submap_store.h"
+#include "core/keyframe_store.h"
 #include "global_ba/adjusted_group.h"
 #include "global_ba/matched_pairs.h"
 
@@ -36,11 +36,11 @@ struct LocalOptions {
 
 struct LocalPart {
   std::set<KeyframeId> moving;
-  std::set<KeyframeId> held;  // may include keyframes that the last adjustment left out
+  std::set<KeyframeId> fixed;  // may include keyframes that the last adjustment left out
 };
 
 LocalPart ChooseLocalPart(const MapPoses& state, const AdjustedGroup& adjusted,
                           const MatchedPairs& pairs, const std::vector<KeyframePair>& new_pairs,
-                          int max_neighbours, SubmapStore* store);
+                          int max_neighbours, KeyframeStore* store);
 
 }  // namespace pangea

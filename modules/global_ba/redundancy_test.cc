@@ -58,7 +58,7 @@ TEST(Redundancy, EdgesReachOverWhatWasCulled) {
       continue;
     }
     const BaKeyframe& before = culled.keyframes[keyframe.previous];
-    const Rigid3 T_true = before.imu.T_odom_body.Inverse() * keyframe.imu.T_odom_body;
+    const Rigid3 T_true = before.state.T_map_body.Inverse() * keyframe.state.T_map_body;
     ASSERT_TRUE(keyframe.edge);
     EXPECT_LT(keyframe.edge->T_previous_this.Minus(T_true).norm(), 1e-9);
     const int steps = keyframe.id.seq - before.id.seq;

@@ -12,7 +12,7 @@
 
 #include "files/text_file.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 using nlohmann::ordered_json;
@@ -183,4 +183,4 @@ void ExportGltf(const std::string& log, const LoggedAnchors& logged, const std::
   WriteTextFile(file, ToGltf(logged, groups));
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -11,7 +11,7 @@
 #include "log_tools/log_anchors.h"
 #include "report/report_pictures.h"
 
-namespace pangea::session {
+namespace pangea {
 
 // One map frame with its points.
 struct GltfGroup {
@@ -30,4 +30,4 @@ std::string ToGltf(const LoggedAnchors& logged, const std::vector<GltfGroup>& gr
 void ExportGltf(const std::string& log, const LoggedAnchors& logged, const std::string& file,
                 LogReadings* readings = nullptr);
 
-}  // namespace pangea::session
+}  // namespace pangea

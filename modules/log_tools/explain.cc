@@ -18,7 +18,7 @@
 #include "messages/messages.h"
 #include "server_options/server_options.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 Constraint FindResult(const std::string& log, int64_t id, LogReadings* readings) {
@@ -206,4 +206,4 @@ std::string ToText(const Explanation& e) {
   return text + "\n" + MeasuredText(e.report);
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -11,7 +11,7 @@
 #include "log_file/log_reading.h"
 #include "loop_verification/aligner.h"
 
-namespace pangea::session {
+namespace pangea {
 
 struct Explanation {
   PlaceCandidate candidate;
@@ -36,4 +36,4 @@ std::string ToText(const Explanation& explanation);
 void WriteExplanationPng(const Explanation& explanation,
                          const std::map<int32_t, std::string>& recordings, const std::string& path);
 
-}  // namespace pangea::session
+}  // namespace pangea

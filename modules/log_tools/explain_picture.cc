@@ -9,7 +9,7 @@
 #include "log_tools/explain.h"
 #include "recording/euroc.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 // Colours by Okabe and Ito, distinguishable with any colour vision (BGR).
@@ -158,4 +158,4 @@ void WriteExplanationPng(const Explanation& explanation,
   }
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -18,7 +18,7 @@
 
 #include "files/text_file.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 // de/dxi: the translation of e is in the measurement's frame, its rotation part is half an angle.
@@ -287,4 +287,4 @@ Graph ReadG2o(const std::string& path, double max_position_m) {
   return reader.Finish();
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -13,7 +13,7 @@
 
 #include "core/rigid3.h"
 
-namespace pangea::session {
+namespace pangea {
 
 struct GraphEdge {
   int from = 0, to = 0;
@@ -38,4 +38,4 @@ std::string ToG2o(const Graph& graph);
 // edges between the same vertices are two measurements.
 Graph ReadG2o(const std::string& path, double max_position_m = 1e12);
 
-}  // namespace pangea::session
+}  // namespace pangea

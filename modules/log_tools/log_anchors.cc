@@ -15,7 +15,7 @@
 #include "messages/anchor_messages.h"
 #include "messages/channels.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 using nlohmann::ordered_json;
@@ -213,4 +213,4 @@ std::string ToJson(const LoggedAnchors& logged) {
          "\n";
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -10,7 +10,7 @@
 #include "core/anchor.h"
 #include "log_file/log_reading.h"
 
-namespace pangea::session {
+namespace pangea {
 
 struct LoggedAnchor {
   int64_t revision = 0;
@@ -43,4 +43,4 @@ std::string ToText(const LoggedAnchors& logged, const std::string& log);
 // All fields of all anchors. Poses: T_map_anchor in the frame of `map` (z up), quaternion w x y z.
 std::string ToJson(const LoggedAnchors& logged);
 
-}  // namespace pangea::session
+}  // namespace pangea

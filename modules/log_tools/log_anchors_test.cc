@@ -16,7 +16,7 @@
 #include "log_tools/log_export.h"
 #include "messages/anchor_messages.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 using nlohmann::json;
@@ -325,4 +325,4 @@ TEST_F(LogAnchorsTest, EachGroupIsASceneOfItsOwn) {
 }
 
 }  // namespace
-}  // namespace pangea::session
+}  // namespace pangea

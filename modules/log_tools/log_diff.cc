@@ -10,7 +10,7 @@
 #include "log_tools/message_fields.h"
 #include "messages/channels.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 struct Message {
@@ -153,4 +153,4 @@ std::string ToText(const LogDiff& diff) {
   return text;
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

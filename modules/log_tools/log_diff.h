@@ -11,7 +11,7 @@
 
 #include "log_file/log_reading.h"
 
-namespace pangea::session {
+namespace pangea {
 
 struct ChannelDiff {
   std::string channel;
@@ -41,4 +41,4 @@ LogDiff DiffLogs(const std::string& a, const std::string& b,
 
 std::string ToText(const LogDiff& diff);
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -9,7 +9,7 @@
 #include "pangea/correction_t.hpp"
 #include "pangea/status_t.hpp"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 using testing::AllOf;
@@ -92,4 +92,4 @@ TEST_F(LogDiffTest, AChannelOfOneLogAlone) {
 }
 
 }  // namespace
-}  // namespace pangea::session
+}  // namespace pangea

@@ -14,7 +14,7 @@
 #include "log_file/log_reader.h"
 #include "log_tools/message_fields.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 std::regex Expression(const std::string& text) {
@@ -90,7 +90,7 @@ void ListJson(const LogEvent& event, std::ostream& out) {
 }
 
 // The position of an event in its log.
-struct Place {
+struct EventPlace {
   int64_t utime = 0;
   size_t log = 0;
   size_t event = 0;
@@ -157,7 +157,7 @@ int64_t CutLog(const std::string& log, const LogCut& cut, const std::string& out
 int64_t MergeLogs(const std::vector<std::string>& logs, const std::string& out,
                   LogReadings* readings) {
   NewLog made(out);
-  std::vector<Place> places;
+  std::vector<EventPlace> places;
   for (size_t log = 0; log < logs.size(); ++log) {
     size_t event = 0;
     // Each log keeps its own order, although its capture times may decrease.
@@ -171,13 +171,13 @@ int64_t MergeLogs(const std::vector<std::string>& logs, const std::string& out,
   if (places.empty()) {
     throw std::runtime_error(fmt::format("{}: there is no event to write", out));
   }
-  std::ranges::stable_sort(places, {}, &Place::utime);
+  std::ranges::stable_sort(places, {}, &EventPlace::utime);
   std::deque<LogReader> files;
   for (const std::string& log : logs) {
     files.emplace_back(log);
   }
   Progress progress("writing " + out);
-  for (const Place& place : places) {
+  for (const EventPlace& place : places) {
     progress.Update(made.count(), std::ssize(places), "events");
     const LogEvent* event = files[place.log].Next();
     if (event == nullptr) {
@@ -189,4 +189,4 @@ int64_t MergeLogs(const std::vector<std::string>& logs, const std::string& out,
   return made.count();
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -14,7 +14,7 @@
 #include "log_file/log_reading.h"
 #include "log_file/log_writer.h"
 
-namespace pangea::session {
+namespace pangea {
 
 struct LogCut {
   double from_s = 0;  // since the log's first event, capture time
@@ -62,4 +62,4 @@ int64_t CutLog(const std::string& log, const LogCut& cut, const std::string& out
 int64_t MergeLogs(const std::vector<std::string>& logs, const std::string& out,
                   LogReadings* readings = nullptr);
 
-}  // namespace pangea::session
+}  // namespace pangea

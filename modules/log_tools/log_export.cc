@@ -15,7 +15,7 @@
 #include "report/report_pictures.h"
 #include "report/report_text.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 // The odometry edges of the log's keyframes, by the keyframe at their end.
@@ -116,4 +116,4 @@ NamedGraph GraphOf(const std::string& log, LogReadings* readings) {
   return builder.Take();
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -10,7 +10,7 @@
 #include "log_file/log_reading.h"
 #include "log_tools/g2o.h"
 
-namespace pangea::session {
+namespace pangea {
 
 // Writes the poses of each agent's keyframes in its group's map frame: <folder>/agent_<id>.tum, and
 // another file for each further group of the agent. Returns the files. Throws std::runtime_error if
@@ -29,4 +29,4 @@ struct NamedGraph {
 };
 NamedGraph GraphOf(const std::string& log, LogReadings* readings = nullptr);
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -15,7 +15,7 @@
 #include "messages/messages_checks.h"
 #include "report/metrics/report_groups.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 void CheckVertices(const NamedGraph& exported, const Graph& solved, const std::string& g2o) {
@@ -92,4 +92,4 @@ int64_t ImportG2o(const std::string& log, const std::string& g2o, const std::str
   return std::ssize(solved.vertices);
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -7,7 +7,7 @@
 
 #include "log_file/log_reading.h"
 
-namespace pangea::session {
+namespace pangea {
 
 // Copies `log` to `out`, and appends, as the newest MAP_STATE of each group, the poses of a g2o
 // file that was exported from the log (with the vertex numbers of GraphOf) and solved elsewhere. A
@@ -18,4 +18,4 @@ namespace pangea::session {
 int64_t ImportG2o(const std::string& log, const std::string& g2o, const std::string& out,
                   LogReadings* readings = nullptr);
 
-}  // namespace pangea::session
+}  // namespace pangea

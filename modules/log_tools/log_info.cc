@@ -12,7 +12,7 @@
 #include "messages/channels.h"
 #include "messages/messages.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 double Seconds(int64_t us) { return 1e-6 * static_cast<double>(us); }
@@ -143,4 +143,4 @@ std::string ToText(const LogSummary& summary, const std::string& log) {
   return text;
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -11,7 +11,7 @@
 #include "core/ids.h"
 #include "log_file/log_reading.h"
 
-namespace pangea::session {
+namespace pangea {
 
 struct ChannelSummary {
   int64_t events = 0;
@@ -38,4 +38,4 @@ std::set<int32_t> AgentsIn(const std::vector<std::string>& logs, LogReadings* re
 // A text for people.
 std::string ToText(const LogSummary& summary, const std::string& log);
 
-}  // namespace pangea::session
+}  // namespace pangea

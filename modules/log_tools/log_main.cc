@@ -21,7 +21,7 @@
 #include "options/command_line.h"
 #include "report/session_record.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 struct Arguments {
@@ -267,7 +267,7 @@ void AddCommands(CLI::App& app, Arguments* arguments) {
   }
 }
 
-}  // namespace pangea::session
+}  // namespace pangea
 
 int main(int argc, char** argv) {
   CLI::App app("What is in a captured LCM log, parts of it, and other formats", "pangea-log");
@@ -276,8 +276,8 @@ int main(int argc, char** argv) {
       "Exit code: 0; 1 when something could not be done; 2 when logs differ; 3 when something of a "
       "log is lost (it is damaged, or ends in the middle of an event): then all is of what could "
       "be read; above 100 for a wrong command line.");
-  pangea::session::Arguments arguments;
-  pangea::session::AddCommands(app, &arguments);
+  pangea::Arguments arguments;
+  pangea::AddCommands(app, &arguments);
   const int failed = pangea::RunSubcommand(app, argc, argv);
   return pangea::TellLosses("pangea-log", arguments.readings,
                             failed != 0 ? failed : arguments.exit_code);

@@ -20,7 +20,7 @@
 #include "log_tools/log_info.h"
 #include "log_tools/recording_arguments.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 namespace fs = std::filesystem;
@@ -389,4 +389,4 @@ TEST_F(LogToolsTest, AFullDiskLeavesNoPartOfALog) {
 }
 
 }  // namespace
-}  // namespace pangea::session
+}  // namespace pangea

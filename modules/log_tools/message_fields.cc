@@ -12,7 +12,7 @@
 #include "core/big_endian.h"
 #include "pangea_schemas.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 struct Member {
@@ -273,4 +273,4 @@ std::optional<DecodedMessage> DecodeFields(Bytes data) {
   return fits ? std::optional(std::move(message)) : std::nullopt;
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -10,7 +10,7 @@
 
 #include "bus/bus.h"
 
-namespace pangea::session {
+namespace pangea {
 
 struct MessageField {
   std::string path;   // "candidates[0].score"
@@ -31,4 +31,4 @@ nlohmann::ordered_json ToJson(const DecodedMessage& message);
 // Only the type.
 std::optional<std::string> TypeOf(Bytes data);
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -9,7 +9,7 @@
 #include "log_file/log_reader.h"
 #include "pangea/place_match_t.hpp"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 using testing::Contains;
@@ -104,4 +104,4 @@ TEST(MessageFields, EveryMessageOfACaptureDecodes) {
 }
 
 }  // namespace
-}  // namespace pangea::session
+}  // namespace pangea

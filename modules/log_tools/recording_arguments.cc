@@ -9,7 +9,7 @@
 
 #include "log_tools/log_info.h"
 
-namespace pangea::session {
+namespace pangea {
 
 std::map<int32_t, std::string> RecordingsById(const std::vector<std::string>& arguments) {
   std::map<int32_t, std::string> folders;
@@ -44,4 +44,4 @@ std::map<int32_t, std::string> RecordingsOf(const std::vector<std::string>& argu
   return folders;
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -10,7 +10,7 @@
 
 #include "log_file/log_reading.h"
 
-namespace pangea::session {
+namespace pangea {
 
 // Folders by agent; if an agent is given twice, the last one. Throws std::runtime_error for an
 // argument that is not ID=FOLDER, or a missing folder.
@@ -21,4 +21,4 @@ std::map<int32_t, std::string> RecordingsOf(const std::vector<std::string>& argu
                                             const std::vector<std::string>& logs,
                                             LogReadings* readings = nullptr);
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -77,7 +77,7 @@ TEST(AlignerTest, TheTiltIsWeighedAboutItsAxis) {
   TestAgentOptions tilted = SecondAgent(0);
   tilted.odom_tilt = 0.018;
   const TestAgent c = RunTestAgent(room, tilted);
-  SubmapStore store;
+  KeyframeStore store;
   for (const TestAgent* agent : {&m, &c}) {
     for (Keyframe keyframe : agent->keyframes) {
       keyframe.roll_pitch_covariance.setZero();
@@ -156,7 +156,7 @@ TEST(AlignerTest, TheGateOfTheKindIsObeyed) {
   walk.num_keyframes = 80;
   walk.step_angle = 2 * std::numbers::pi / 68;
   const TestAgent agent = RunTestAgent(room, walk);
-  SubmapStore store;
+  KeyframeStore store;
   for (const Keyframe& keyframe : agent.keyframes) {
     store.Add(keyframe);
   }

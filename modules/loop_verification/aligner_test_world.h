@@ -15,7 +15,7 @@ inline Constraint Align(const TestAgent& query_agent, int query, const TestAgent
                         int match, const PlaceCandidate& candidate,
                         const LoopVerificationOptions& options = {},
                         LoopVerificationReport* report = nullptr) {
-  SubmapStore store;
+  KeyframeStore store;
   for (const TestAgent* agent : {&query_agent, &match_agent}) {
     for (const Keyframe& keyframe : agent->keyframes) {
       store.Add(keyframe);

@@ -16,7 +16,7 @@ constexpr double kDriftPerM = 0.02;
 
 // Path length between two keyframes of one map, m.
 std::optional<double> PathBetween(const MapId& map, int32_t a, int32_t b,
-                                  const SubmapStore& store) {
+                                  const KeyframeStore& store) {
   return store.PathBetween({map, std::min(a, b)}, {map, std::max(a, b)});
 }
 
@@ -30,7 +30,7 @@ void KnownConstraints::Add(const Constraint& constraint) {
 }
 
 bool KnownConstraints::IsRedundant(const KeyframeId& query, const KeyframeId& match,
-                                   const SubmapStore& store) const {
+                                   const KeyframeStore& store) const {
   const Nearby nearby = NearbyOf(query, match, store);
   if (nearby.gain_bits >= options_.min_gain_bits) {
     return false;
@@ -89,7 +89,7 @@ void KnownConstraints::Restore(ByteReader* reader) {
 
 KnownConstraints::Nearby KnownConstraints::NearbyOf(const KeyframeId& query,
                                                     const KeyframeId& match,
-                                                    const SubmapStore& store) const {
+                                                    const KeyframeStore& store) const {
   const auto [a, b] = std::minmax(query, match);
   std::vector<double> sigmas;
   double known = 0;

@@ -20,8 +20,8 @@
 #include <vector>
 
 #include "core/byte_record.h"
+#include "core/keyframe_store.h"
 #include "core/server_messages.h"
-#include "core/submap_store.h"
 
 namespace pangea {
 
@@ -59,9 +59,10 @@ class KnownConstraints {
     double gain_bits = 0;
   };
   // `store`: has the odometry of the maps.
-  Nearby NearbyOf(const KeyframeId& query, const KeyframeId& match, const SubmapStore& store) const;
+  Nearby NearbyOf(const KeyframeId& query, const KeyframeId& match,
+                  const KeyframeStore& store) const;
   bool IsRedundant(const KeyframeId& query, const KeyframeId& match,
-                   const SubmapStore& store) const;
+                   const KeyframeStore& store) const;
 
  private:
   struct Known {

@@ -12,7 +12,7 @@ const MapId kA{1, 1'000'000};
 const MapId kB{2, 2'000'000};
 
 // Keyframes in a row, with distances of kStep_m.
-void AddRow(const MapId& map, int count, SubmapStore* store) {
+void AddRow(const MapId& map, int count, KeyframeStore* store) {
   for (int32_t seq = 0; seq < count; ++seq) {
     Keyframe keyframe;
     keyframe.id = {map, seq};
@@ -46,7 +46,7 @@ class KnownConstraintsTest : public testing::Test {
     return known_.NearbyOf(query, match, store_).gain_bits;
   }
 
-  SubmapStore store_;
+  KeyframeStore store_;
   KnownConstraints known_{KnownConstraintOptions{.min_gain_bits = 1, .min_between_maps = 1}};
 };
 

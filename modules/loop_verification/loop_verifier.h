@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/submap_store.h"
+#include "core/keyframe_store.h"
 #include "loop_verification/aligner.h"
 #include "loop_verification/drift_gate.h"
 #include "loop_verification/known_constraints.h"
@@ -34,7 +34,7 @@ struct LoopVerifierOptions {
 
 class LoopVerifier {
  public:
-  // `records`: stores keyframes (submap_store.h); null: they stay in memory.
+  // `records`: stores keyframes (keyframe_store.h); null: they stay in memory.
   explicit LoopVerifier(const LoopVerifierOptions& options,
                         std::shared_ptr<RecordStore> records = nullptr)
       : drift_(options.drift),
@@ -59,7 +59,7 @@ class LoopVerifier {
 
   // The record of a keyframe, as it is stored in `records`.
   static std::vector<uint8_t> RecordOf(const Keyframe& keyframe) {
-    return SubmapStore::RecordOf(keyframe, {});
+    return KeyframeStore::RecordOf(keyframe, {});
   }
   // Saves the keyframes and known constraints. Restore returns false, and changes nothing, if the
   // bytes are not those of a LoopVerifier.
@@ -75,7 +75,7 @@ class LoopVerifier {
   DriftGateOptions drift_;
   Aligner aligner_;
   KnownConstraints known_;
-  SubmapStore store_;
+  KeyframeStore store_;
 };
 
 // A refused constraint without a pose.

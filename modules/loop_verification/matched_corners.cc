@@ -15,7 +15,7 @@ constexpr double kPixelSigma = 1;  // of a corner on octave 0
 constexpr double kOtherCorner_px = 4;
 constexpr double kMaxLineSigmas = 3;  // from the epipolar line
 constexpr double kMaxRayChi2 = 9.2;   // 99 % of 2 degrees of freedom
-constexpr double kLeastBaseline_m = 0.02;
+constexpr double kMinBaseline_m = 0.02;
 constexpr double kNearest_m = 0.2, kFarthest_m = 60;
 // Verification treats the errors of landmarks as independent; a common error is an error of scale,
 // so it must be small.
@@ -147,7 +147,7 @@ class Triangulation {
         neighbour.largest_sigma = std::max(neighbour.largest_sigma, neighbour.sigmas.back());
       }
     }
-    if (neighbour.T_cam_host.t.norm() > kLeastBaseline_m) {
+    if (neighbour.T_cam_host.t.norm() > kMinBaseline_m) {
       neighbours_.push_back(std::move(neighbour));
     }
   }

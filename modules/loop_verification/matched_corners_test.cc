@@ -43,7 +43,7 @@ class MatchedCorners : public testing::Test {
   }
 
   TestAgent agent_;
-  SubmapStore store_;
+  KeyframeStore store_;
 };
 
 TEST_F(MatchedCorners, DepthsAreAsCertainAsTheyClaim) {

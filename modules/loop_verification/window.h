@@ -12,7 +12,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "core/submap_store.h"
+#include "core/keyframe_store.h"
 
 namespace pangea {
 

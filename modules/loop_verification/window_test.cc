@@ -15,7 +15,7 @@ size_t NumFrames(double step_m, bool with_points = true, int num_keyframes = 20)
   walk.num_keyframes = num_keyframes;
   walk.radius = step_m / walk.step_angle;
   const TestAgent agent = RunTestAgent(MakeTestRoom({}), walk);
-  SubmapStore store;
+  KeyframeStore store;
   for (Keyframe keyframe : agent.keyframes) {
     if (!with_points) {
       keyframe.points.clear();

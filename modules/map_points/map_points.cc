@@ -135,7 +135,7 @@ std::vector<MapPoints::Source> MapPoints::SourcesFor(const AgentPose& agent,
 // Fills one message.
 class MapPoints::Selection {
  public:
-  Selection(const PosedGroup& group, const Outlook& outlook, SubmapStore* store,
+  Selection(const PosedGroup& group, const Outlook& outlook, KeyframeStore* store,
             SentPoints* sent_points)
       : group_(group), outlook_(outlook), store_(store), sent_points_(sent_points) {
     ++sent_points_->messages;
@@ -145,7 +145,7 @@ class MapPoints::Selection {
   }
 
   void Add(const Source& source) {
-    constexpr int kShare = (kMostLandmarks + kMostSources - 1) / kMostSources;
+    constexpr int kShare = (kMaxMessageLandmarks + kMaxMessageSources - 1) / kMaxMessageSources;
     const auto view = store_->Find(source.id);
     int taken = 0;
     for (const auto& [corner, pixel] : source.points) {
@@ -164,8 +164,12 @@ class MapPoints::Selection {
     }
   }
 
-  bool IsFull() const { return static_cast<int>(message_.landmarks.size()) >= kMostLandmarks; }
-  bool HasAllSources() const { return static_cast<int>(message_.sources.size()) >= kMostSources; }
+  bool IsFull() const {
+    return static_cast<int>(message_.landmarks.size()) >= kMaxMessageLandmarks;
+  }
+  bool HasAllSources() const {
+    return static_cast<int>(message_.sources.size()) >= kMaxMessageSources;
+  }
   MapLandmarks TakeMessage() { return std::move(message_); }
 
  private:
@@ -201,7 +205,7 @@ class MapPoints::Selection {
 
   const PosedGroup& group_;
   const Outlook& outlook_;
-  SubmapStore* store_;
+  KeyframeStore* store_;
   SentPoints* sent_points_;
   MapLandmarks message_;
   std::set<Track> taken_;

@@ -10,7 +10,7 @@
 // nothing to the agent's odometry (docs/decisions/live_pose.md). Poses are always those of the
 // newest state.
 //
-// No clock, no thread; the same calls give the same bytes. Bounded: keyframes as in SubmapStore,
+// No clock, no thread; the same calls give the same bytes. Bounded: keyframes as in KeyframeStore,
 // and the landmarks recently sent to each map.
 
 #include <Eigen/Core>
@@ -23,16 +23,17 @@
 #include <vector>
 
 #include "core/group_states.h"
+#include "core/keyframe_store.h"
 #include "core/map_landmarks.h"
 #include "core/server_messages.h"
-#include "core/submap_store.h"
 
 namespace pangea {
 
 // Limits for one message. A source is a keyframe from which landmarks come. A message fits into
 // 1200 bytes (landmarks_t).
-inline constexpr int kMostSources = 4;
-inline constexpr int kMostLandmarks = (1200 - 154) / static_cast<int>(25 + sizeof(Descriptor));
+inline constexpr int kMaxMessageSources = 4;
+inline constexpr int kMaxMessageLandmarks =
+    (1200 - 154) / static_cast<int>(25 + sizeof(Descriptor));
 
 // An agent's pose (POSE_k).
 struct AgentPose {
@@ -49,7 +50,7 @@ class MapPoints {
 
   // The record of a keyframe, as it is stored in `records`.
   static std::vector<uint8_t> RecordOf(const Keyframe& keyframe) {
-    return SubmapStore::RecordOf(keyframe, kStore);
+    return KeyframeStore::RecordOf(keyframe, kStore);
   }
   // Saves only the keyframes: the journal has no states and refinements. Restore returns false, and
   // changes nothing, if the bytes are not those of a MapPoints.
@@ -69,7 +70,7 @@ class MapPoints {
   size_t num_refined() const { return refined_.size(); }
 
  private:
-  static constexpr SubmapStoreOptions kStore{.max_views = 512};
+  static constexpr KeyframeStoreOptions kStore{.max_views = 512};
 
   // The agent's predicted view.
   struct Outlook {
@@ -102,7 +103,7 @@ class MapPoints {
                                  const Outlook& outlook);
   Source Look(const KeyframeView& view, const Rigid3& T_map_cam, const Outlook& outlook) const;
 
-  SubmapStore store_;
+  KeyframeStore store_;
   GroupStates<PosedGroup> groups_;
   std::set<KeyframeId> refined_;
   std::map<MapId, SentPoints> sent_points_;

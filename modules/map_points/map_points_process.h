@@ -24,7 +24,7 @@ class MapPointsProcess : public Process {
  public:
   static constexpr int64_t kInterval_us = 500'000;  // between two messages to one agent
 
-  // `records`: stores keyframes (core/submap_store.h).
+  // `records`: stores keyframes (core/keyframe_store.h).
   explicit MapPointsProcess(Bus& bus, const std::shared_ptr<RecordStore>& records = nullptr,
                             const CheckpointPlace& checkpoint = {});
 

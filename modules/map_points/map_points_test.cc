@@ -97,8 +97,8 @@ TEST_F(MapPointsTest, TellsWhatTheAgentWillSee) {
   EXPECT_EQ(message->group, kOld);
   EXPECT_EQ(message->revision, 5);
   EXPECT_GT(message->landmarks.size(), 10u);
-  EXPECT_LE(message->landmarks.size(), static_cast<size_t>(kMostLandmarks));
-  EXPECT_LE(message->sources.size(), static_cast<size_t>(kMostSources));
+  EXPECT_LE(message->landmarks.size(), static_cast<size_t>(kMaxMessageLandmarks));
+  EXPECT_LE(message->sources.size(), static_cast<size_t>(kMaxMessageSources));
   const Rigid3 T_cam_map = (PoseAt(0).T_map_body * camera_.T_body_cam).Inverse();
   for (const MapLandmark& landmark : message->landmarks) {
     const auto pixel = camera_.Project(T_cam_map * landmark.p_map);

@@ -27,7 +27,7 @@ struct Ray {
 };
 
 std::optional<Ray> RayIn(const MapPoses& poses, const KeyframeId& id, int32_t landmark_id,
-                         SubmapStore* store) {
+                         KeyframeStore* store) {
   const auto pose = poses.find(id);
   const auto view = pose == poses.end() ? nullptr : store->Find(id);
   if (view == nullptr) {
@@ -43,7 +43,7 @@ std::optional<Ray> RayIn(const MapPoses& poses, const KeyframeId& id, int32_t la
 
 // The track's observations: a track is one contiguous run of keyframes.
 std::vector<Ray> RaysOf(const MapPoses& poses, const KeyframeId& id, int32_t landmark_id,
-                        SubmapStore* store) {
+                        KeyframeStore* store) {
   std::vector<Ray> rays;
   for (const int step : {-1, 1}) {
     for (int32_t seq = step < 0 ? id.seq : id.seq + 1;; seq += step) {
@@ -69,7 +69,7 @@ std::vector<LineOfSight> LinesOfSight(const std::vector<Ray>& rays) {
 }  // namespace
 
 std::optional<TrackPoint> PointOfTrack(const MapPoses& poses, const KeyframeView& source,
-                                       int corner, SubmapStore* store) {
+                                       int corner, KeyframeStore* store) {
   const Keyframe& keyframe = source.keyframe();
   const std::vector<Ray> rays =
       RaysOf(poses, keyframe.id, keyframe.corners[corner].landmark_id, store);

@@ -8,7 +8,7 @@
 
 #include "core/group_states.h"
 #include "core/keyframe.h"
-#include "core/submap_store.h"
+#include "core/keyframe_store.h"
 
 namespace pangea {
 
@@ -22,6 +22,6 @@ struct TrackPoint {
 
 // `corner` of `source` must have a landmark_id. Empty if the rays do not determine the point.
 std::optional<TrackPoint> PointOfTrack(const MapPoses& poses, const KeyframeView& source,
-                                       int corner, SubmapStore* store);
+                                       int corner, KeyframeStore* store);
 
 }  // namespace pangea

@@ -18,7 +18,7 @@ const MapId kMap{1, 100};
 std::optional<TrackPoint> PointSeenWith(const std::vector<Eigen::Vector2d>& offsets, double step_m,
                                         const Vector3d& p_map) {
   MapPoses poses;
-  SubmapStore store;
+  KeyframeStore store;
   for (int i = 0; i < static_cast<int>(offsets.size()); ++i) {
     Keyframe keyframe;
     keyframe.id = {kMap, i};

@@ -116,11 +116,11 @@ void PlaceRecognition::Save(ByteWriter* writer) {
 }
 
 bool PlaceRecognition::Restore(ByteReader* reader) {
-  constexpr size_t kLeastBytes = 16;
+  constexpr size_t kMinBytes = 16;
   Counters counters;
   reader->Get(&counters.keyframes);
   std::map<MapId, std::vector<KeyframeId>> last_matches;
-  for (size_t left = reader->GetCount(kLeastBytes); left > 0; --left) {
+  for (size_t left = reader->GetCount(kMinBytes); left > 0; --left) {
     MapId map;
     reader->Get(&map);
     reader->Get(&last_matches[map]);

@@ -152,10 +152,10 @@ void StoredKeyframes::Save(ByteWriter* writer) const {
 }
 
 bool StoredKeyframes::Restore(ByteReader* reader) {
-  constexpr size_t kLeastBytes = 32;
+  constexpr size_t kMinBytes = 32;
   constexpr size_t kMaxRecordBytes = RecordBytes(kMaxCorners);
   std::deque<Stored> keyframes;
-  for (size_t left = reader->GetCount(kLeastBytes); left > 0; --left) {
+  for (size_t left = reader->GetCount(kMinBytes); left > 0; --left) {
     KeyframeId id;
     AscendingNumbers landmarks;
     int64_t offset = 0;

@@ -72,9 +72,9 @@ void OdometryChain::Save(ByteWriter* writer) const {
 }
 
 bool OdometryChain::Restore(ByteReader* reader) {
-  constexpr size_t kLeastBytes = 100;
+  constexpr size_t kMinBytes = 100;
   reader->Get(&num_bridged_);
-  nodes_.resize(reader->GetCount(kLeastBytes));
+  nodes_.resize(reader->GetCount(kMinBytes));
   for (Node& node : nodes_) {
     VisitParts(node, [reader](auto* part) { reader->Get(part); });
   }

@@ -290,7 +290,7 @@ void EurocRecording::ReadImu() {
       imu_.push_back(sample);
     } else {
       complaints.Add(row.line, fmt::format("above {} rad/s or {} m/s^2, which no sensor shows",
-                                           kMostGyro, kMostAccel));
+                                           kMaxGyro, kMaxAccel));
     }
   }
   complaints.ThrowIfTooMany(num_rows, expected);

@@ -13,7 +13,7 @@
 #include "messages/channels.h"
 #include "messages/messages.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 // Throws with the missing keyframes: "map 1/17…: keyframes 12 to 15 are missing". If an odometry
@@ -143,4 +143,4 @@ std::vector<LoggedKeyframe> Interleave(std::vector<std::vector<LoggedKeyframe>> 
   }
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -10,7 +10,7 @@
 #include "core/ids.h"
 #include "log_file/log_reading.h"
 
-namespace pangea::session {
+namespace pangea {
 
 struct LoggedKeyframe {
   std::string channel;
@@ -38,4 +38,4 @@ std::vector<LoggedKeyframe> ReadKeyframeLogOf(const std::filesystem::path& log, 
 // different sensor clocks. elapsed_us becomes that time; a single log is unchanged.
 std::vector<LoggedKeyframe> Interleave(std::vector<std::vector<LoggedKeyframe>> logs);
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -8,7 +8,7 @@
 #include "log_file/log_writer.h"
 #include "messages/keyframe_message.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 using testing::HasSubstr;
@@ -126,4 +126,4 @@ TEST(KeyframeLog, InterleavesAgentsOfDifferentClocksByTheCaptureOfTheirFirstKeyf
 }
 
 }  // namespace
-}  // namespace pangea::session
+}  // namespace pangea

@@ -7,7 +7,7 @@
 #include "bus/retransmission/playback_pace.h"
 #include "files/progress.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 constexpr int64_t kStatusInterval_us = 1'000'000;
@@ -73,4 +73,4 @@ void PlayKeyframes(LcmBus& bus, const KeyframePlayerOptions& options,
   player.PublishFinished(WallUtime());
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -12,7 +12,7 @@
 #include "bus/retransmission/reliable_keyframe_publisher.h"
 #include "replay/keyframe_log.h"
 
-namespace pangea::session {
+namespace pangea {
 
 struct KeyframePlayerOptions {
   int32_t agent_id = 0;
@@ -50,4 +50,4 @@ class KeyframePlayer : public Process {
 void PlayKeyframes(LcmBus& bus, const KeyframePlayerOptions& options,
                    std::vector<LoggedKeyframe> keyframes);
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -11,7 +11,7 @@
 int main(int argc, char** argv) {
   CLI::App app("Plays stored keyframes onto an agent's bus, in place of an odometry",
                "pangea-keyframe-player");
-  pangea::session::KeyframePlayerOptions options;
+  pangea::KeyframePlayerOptions options;
   std::string bus_url = pangea::kDefaultBusUrl;
   std::string log, rate = "1";
   app.add_option("--agent", options.agent_id, "agent id, as in the keyframes")
@@ -36,9 +36,9 @@ int main(int argc, char** argv) {
     options.rate = rate == "max" ? 0 : std::stod(rate);
     pangea::InstallSignalHandlers();
     pangea::LcmBus bus(bus_url);
-    auto keyframes = pangea::session::ReadKeyframeLogOf(log, options.agent_id, &readings);
+    auto keyframes = pangea::ReadKeyframeLogOf(log, options.agent_id, &readings);
     const int exit_code = pangea::TellLosses("pangea-keyframe-player", readings, 0);
-    pangea::session::PlayKeyframes(bus, options, std::move(keyframes));
+    pangea::PlayKeyframes(bus, options, std::move(keyframes));
     return exit_code;
   } catch (const std::exception& error) {
     return pangea::TellLosses("pangea-keyframe-player", readings,

@@ -7,7 +7,7 @@
 #include "messages/messages.h"
 #include "pangea/again_t.hpp"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 const MapId kMap{4, 1000};
@@ -86,4 +86,4 @@ TEST_F(KeyframePlayerTest, AnswersForWhatItHasPlayed) {
 }
 
 }  // namespace
-}  // namespace pangea::session
+}  // namespace pangea

@@ -10,7 +10,7 @@
 #include "messages/channels.h"
 #include "messages/messages.h"
 
-namespace pangea::session {
+namespace pangea {
 
 LoggedEdits ReadAnchorEdits(const std::filesystem::path& log, LogReadings* readings) {
   LoggedEdits edits;
@@ -43,4 +43,4 @@ void Merge(const LoggedEdits& edits, LoggedEdits* all) {
   }
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -10,7 +10,7 @@
 #include "log_file/log_reading.h"
 #include "pangea/anchor_edit_t.hpp"
 
-namespace pangea::session {
+namespace pangea {
 
 // Keyed by the keyframe that precedes the edits in the log; edits before the first keyframe have
 // that one's key. The server's log and a journal contain edits; an agent's log does not.
@@ -23,4 +23,4 @@ LoggedEdits ReadAnchorEdits(const std::filesystem::path& log, LogReadings* readi
 // Adds `edits` to `all`, for several logs.
 void Merge(const LoggedEdits& edits, LoggedEdits* all);
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -25,7 +25,7 @@
 #include "replay/keyframe_log.h"
 #include "replay/logged_edits.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 namespace fs = std::filesystem;
@@ -350,4 +350,4 @@ int64_t ReplayPart(const fs::path& log, const ReplayedPart& part, const fs::path
   return taken_over;
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -16,7 +16,7 @@
 #include "log_file/log_reading.h"
 #include "server_options/server_options.h"
 
-namespace pangea::session {
+namespace pangea {
 
 struct ReplaySummary {
   int64_t keyframes = 0;
@@ -59,4 +59,4 @@ int64_t ReplayPart(const std::filesystem::path& log, const ReplayedPart& part,
                    const std::filesystem::path& out_log, Progress& progress,
                    LogReadings* readings = nullptr);
 
-}  // namespace pangea::session
+}  // namespace pangea

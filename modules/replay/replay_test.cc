@@ -12,7 +12,7 @@
 #include "messages/messages.h"
 #include "replay/keyframe_log.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 using testing::EndsWith;
@@ -148,4 +148,4 @@ TEST_F(ReplayOfAnchors, TakesAlongWhatAThinningDerived) {
 }
 
 }  // namespace
-}  // namespace pangea::session
+}  // namespace pangea

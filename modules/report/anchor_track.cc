@@ -6,7 +6,7 @@
 #include "messages/channels.h"
 #include "pangea/pose_t.hpp"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 // The parsed message; empty if it does not parse.
@@ -58,4 +58,4 @@ void AnchorTrackReader::AddFrame(const LogEvent& event) {
   }
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

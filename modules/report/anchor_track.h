@@ -10,7 +10,7 @@
 #include "core/anchor.h"
 #include "log_file/log_reader.h"
 
-namespace pangea::session {
+namespace pangea {
 
 // The anchors shown together with one pose, while the odometry tracked.
 struct AnchorFrame {
@@ -51,4 +51,4 @@ class AnchorTrackReader {
   AnchorTrack track_;
 };
 
-}  // namespace pangea::session
+}  // namespace pangea

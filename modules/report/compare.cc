@@ -8,7 +8,7 @@
 #include "eval/table.h"
 #include "files/text_file.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 namespace fs = std::filesystem;
@@ -103,4 +103,4 @@ std::string CompareRuns(const std::vector<fs::path>& runs) {
   return table.Text() + (options.empty() ? "" : "\n" + options);
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

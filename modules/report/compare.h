@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-namespace pangea::session {
+namespace pangea {
 
 // Writes how long a run took, for CompareRuns. It is not in the report, which must be reproducible.
 void WriteTiming(double wall_s, const std::filesystem::path& folder);
@@ -17,4 +17,4 @@ void WriteTiming(double wall_s, const std::filesystem::path& folder);
 // `replay` or `report`, or the report.json in them. Throws std::runtime_error if one has no report.
 std::string CompareRuns(const std::vector<std::filesystem::path>& runs);
 
-}  // namespace pangea::session
+}  // namespace pangea

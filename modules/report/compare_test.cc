@@ -6,7 +6,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 namespace fs = std::filesystem;
@@ -68,4 +68,4 @@ TEST_F(Compare, WhatHasNoReportIsNamed) {
 }
 
 }  // namespace
-}  // namespace pangea::session
+}  // namespace pangea

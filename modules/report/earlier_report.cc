@@ -13,7 +13,7 @@
 #include "report/report_anchor_pictures.h"
 #include "report/report_text.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 using nlohmann::json;
@@ -61,4 +61,4 @@ void RemoveEarlierReport(const std::string& folder) {
   }
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -8,7 +8,7 @@
 #include <set>
 #include <string_view>
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 using nlohmann::ordered_json;
@@ -233,4 +233,4 @@ ordered_json ToJson(const std::vector<CheckedExpectation>& checked) {
   return json;
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

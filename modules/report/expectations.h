@@ -28,7 +28,7 @@
 #include "eval/table.h"
 #include "options/yaml_options.h"
 
-namespace pangea::session {
+namespace pangea {
 
 // Bounds by name.
 using Expectations = std::map<std::string, double>;
@@ -60,4 +60,4 @@ std::vector<CheckedExpectation> Check(const Expectations& expectations,
 Table ToTable(const std::vector<CheckedExpectation>& checked);
 nlohmann::ordered_json ToJson(const std::vector<CheckedExpectation>& checked);
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -5,7 +5,7 @@
 
 #include <stdexcept>
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 using nlohmann::ordered_json;
@@ -161,4 +161,4 @@ TEST(Expectations, AreReadFromASessionFile) {
 }
 
 }  // namespace
-}  // namespace pangea::session
+}  // namespace pangea

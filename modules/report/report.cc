@@ -13,7 +13,7 @@
 #include "report/report_pictures.h"
 #include "report/report_text.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 using nlohmann::ordered_json;
@@ -87,4 +87,4 @@ WrittenReport WriteReport(const ReportInput& input, const std::string& folder,
   return {std::move(markdown), std::move(checked)};
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -28,7 +28,7 @@
 #include "log_file/log_reading.h"
 #include "report/expectations.h"
 
-namespace pangea::session {
+namespace pangea {
 
 // An emulated bad link between an agent and the server.
 struct LinkRun {
@@ -90,4 +90,4 @@ struct WrittenReport {
 WrittenReport WriteReport(const ReportInput& input, const std::string& folder,
                           LogReadings* readings = nullptr);
 
-}  // namespace pangea::session
+}  // namespace pangea

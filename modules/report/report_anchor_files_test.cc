@@ -14,7 +14,7 @@
 #include "pangea/pose_t.hpp"
 #include "report/report_test_world.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 namespace fs = std::filesystem;
@@ -172,4 +172,4 @@ TEST_F(ReportAnchorFiles, ThePictureHasTheAnchorInBothViews) {
 }
 
 }  // namespace
-}  // namespace pangea::session
+}  // namespace pangea

@@ -12,7 +12,7 @@
 #include "recording/euroc.h"
 #include "report/metrics/report_counts.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 constexpr int kWidth_px = 640;
@@ -215,4 +215,4 @@ std::string AnchorsJpeg(const CapturedSession& session, const ReportMetrics& met
   return {jpeg.begin(), jpeg.end()};
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

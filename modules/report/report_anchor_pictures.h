@@ -6,7 +6,7 @@
 
 #include "report/metrics/report_metrics.h"
 
-namespace pangea::session {
+namespace pangea {
 
 inline constexpr const char* kAnchorPicture = "anchors.jpg";
 inline constexpr size_t kMaxAnchorPictures = 4;
@@ -20,4 +20,4 @@ inline constexpr const char* kAnchorPictureExplained =
 std::string AnchorsJpeg(const CapturedSession& session, const ReportMetrics& metrics,
                         std::vector<std::string>* notes);
 
-}  // namespace pangea::session
+}  // namespace pangea

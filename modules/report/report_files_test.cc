@@ -19,7 +19,7 @@
 #include "report/report.h"
 #include "report/report_test_world.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 namespace fs = std::filesystem;
@@ -216,7 +216,7 @@ TEST_F(ReportFilesTest, AnEarlierReportLeavesNoFilesAndAPersonsFilesStay) {
   input_.agents.resize(1);
   Report();
   for (const std::string& file : {"map" + others + ".ply", "trajectory" + others + ".png",
-                                 std::string("agent_2.tum"), std::string("agent_2.vio.tum")}) {
+                                  std::string("agent_2.tum"), std::string("agent_2.vio.tum")}) {
     EXPECT_FALSE(Exists(file)) << file;
   }
   for (const std::string file : {"agent_3.tum", "notes.md", "map.mine.ply"}) {
@@ -255,4 +255,4 @@ TEST_F(ReportFilesTest, WhatCannotBeDoneIsSaid) {
 }
 
 }  // namespace
-}  // namespace pangea::session
+}  // namespace pangea

@@ -6,7 +6,7 @@
 
 #include "report/metrics/report_counts.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 using nlohmann::ordered_json;
@@ -186,4 +186,4 @@ ordered_json ReportJson(const ReportInput& input, const CapturedSession& session
   return json;
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -6,9 +6,9 @@
 
 #include "report/metrics/report_metrics.h"
 
-namespace pangea::session {
+namespace pangea {
 
 nlohmann::ordered_json ReportJson(const ReportInput& input, const CapturedSession& session,
                                   const ReportMetrics& metrics);
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -15,7 +15,7 @@
 #include "pangea/correction_t.hpp"
 #include "pangea/pose_t.hpp"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 CapturedKeyframe Captured(const Keyframe& keyframe, double session_s) {
@@ -261,4 +261,4 @@ PoseTrack ReadPoses(const std::string& path, int32_t agent_id, LogReadings* read
   return track;
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -19,7 +19,7 @@
 #include "recording/trajectory.h"
 #include "report/anchor_track.h"
 
-namespace pangea::session {
+namespace pangea {
 
 struct CapturedPoint {
   Eigen::Vector3d p_body;
@@ -97,4 +97,4 @@ CapturedSession ReadServerLog(const std::string& path, LogReadings* readings = n
 // agent bus' log.
 PoseTrack ReadPoses(const std::string& path, int32_t agent_id, LogReadings* readings = nullptr);
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -9,7 +9,7 @@
 #include "eval/evaluate.h"
 #include "report/report_text.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 // Points with a larger relative sigma of the depth are not drawn.
@@ -196,4 +196,4 @@ std::vector<Picture> Pictures(const ReportMetrics& metrics) {
   return pictures;
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

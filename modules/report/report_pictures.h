@@ -10,7 +10,7 @@
 #include "eval/plot.h"
 #include "report/metrics/report_metrics.h"
 
-namespace pangea::session {
+namespace pangea {
 
 struct ColouredPoint {
   Eigen::Vector3d p_map;
@@ -33,4 +33,4 @@ struct Picture {
 // One top view of all groups with ground truth; each other group has its own.
 std::vector<Picture> Pictures(const ReportMetrics& metrics);
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -7,7 +7,7 @@
 
 #include "report/metrics/report_counts.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 std::string Cell(const std::optional<double>& value, int decimals) {
@@ -208,4 +208,4 @@ std::string ConstraintsLine(const CapturedSession& session) {
                      counts.accepted_intra, counts.num_refused);
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

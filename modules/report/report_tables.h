@@ -9,7 +9,7 @@
 #include "eval/table.h"
 #include "report/metrics/report_metrics.h"
 
-namespace pangea::session {
+namespace pangea {
 
 Table AgentTable(const ReportMetrics& metrics);
 Table GroupTable(const ReportMetrics& metrics);
@@ -40,4 +40,4 @@ std::vector<std::string> ChangeLines(const CapturedSession& session, const Repor
 // Numbers of accepted and refused constraints.
 std::string ConstraintsLine(const CapturedSession& session);
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -12,7 +12,7 @@
 #include "messages/messages.h"
 #include "report/report_test_world.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 namespace fs = std::filesystem;
@@ -180,4 +180,4 @@ TEST_F(ReportTest, AChangeIsToldInTheTimeOfTheWholeRecording) {
 }
 
 }  // namespace
-}  // namespace pangea::session
+}  // namespace pangea

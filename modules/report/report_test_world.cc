@@ -12,7 +12,7 @@
 #include "pangea/pose_t.hpp"
 #include "pangea/status_t.hpp"
 
-namespace pangea::session {
+namespace pangea {
 
 namespace fs = std::filesystem;
 
@@ -203,4 +203,4 @@ bool ReportWorld::Exists(const std::string& file) const {
   return fs::exists(folder_ + "/out/" + file);
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

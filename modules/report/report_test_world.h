@@ -18,7 +18,7 @@
 #include "recording/trajectory.h"
 #include "report/report.h"
 
-namespace pangea::session {
+namespace pangea {
 
 constexpr int64_t kStart = 1'400'000'000'000'000;   // first image, microseconds
 constexpr int64_t kOpened = 1'700'000'000'000'000;  // when the maps were opened
@@ -88,4 +88,4 @@ class ReportWorld : public ::testing::Test {
   static Keyframe MakeKeyframe(const MapId& map, int seq, double s);
 };
 
-}  // namespace pangea::session
+}  // namespace pangea

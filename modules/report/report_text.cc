@@ -5,7 +5,7 @@
 #include "report/report_anchor_pictures.h"
 #include "report/report_tables.h"
 
-namespace pangea::session {
+namespace pangea {
 
 std::string FileName(const MapId& map) {
   return fmt::format("{}_{}", map.agent_id, map.opened_utime);
@@ -58,4 +58,4 @@ std::string ReportMarkdown(const ReportInput& input, const CapturedSession& sess
   return text;
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

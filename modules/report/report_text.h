@@ -6,7 +6,7 @@
 
 #include "report/metrics/report_metrics.h"
 
-namespace pangea::session {
+namespace pangea {
 
 // A map's name in file names: "1_1700000000000000".
 std::string FileName(const MapId& map);
@@ -15,4 +15,4 @@ std::string FileName(const MapId& map);
 std::string ReportMarkdown(const ReportInput& input, const CapturedSession& session,
                            const ReportMetrics& metrics, bool has_anchor_picture);
 
-}  // namespace pangea::session
+}  // namespace pangea

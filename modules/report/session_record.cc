@@ -9,7 +9,7 @@
 
 #include "files/text_file.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 namespace fs = std::filesystem;
@@ -121,4 +121,4 @@ std::map<int32_t, std::string> RecordingsAtHand(const SessionRecord& session) {
   return folders;
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -13,7 +13,7 @@
 #include "report/expectations.h"
 #include "report/report.h"
 
-namespace pangea::session {
+namespace pangea {
 
 struct SessionRecord {
   std::vector<AgentRun> agents;  // only id, recording and the part that was played
@@ -38,4 +38,4 @@ void GiveRecording(int32_t agent_id, const std::string& folder, SessionRecord* s
 // Folders, by agent, of the recordings that still exist.
 std::map<int32_t, std::string> RecordingsAtHand(const SessionRecord& session);
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -52,8 +52,8 @@ TEST_F(MergeTest, HasAllOfTheFirstAndBehindItTheSecondsKeyframes) {
 TEST_F(MergeTest, TheServerFusesTheMapsOfBoth) {
   MergeSites(first, second, out, {});
   Progress progress("test");
-  session::Replay({out / "journal.lcm"}, {}, 1e9, folder / "replay.lcm", progress);
-  const auto groups = session::FinalGroups(session::ReadServerLog(folder / "replay.lcm"));
+  Replay({out / "journal.lcm"}, {}, 1e9, folder / "replay.lcm", progress);
+  const auto groups = FinalGroups(ReadServerLog(folder / "replay.lcm"));
   ASSERT_EQ(groups.size(), 1u);
   EXPECT_EQ(groups[0].Agents(), (std::vector<int32_t>{1, 2}));
   EXPECT_EQ(groups[0].keyframes.size(), 63u);

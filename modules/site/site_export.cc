@@ -54,18 +54,18 @@ std::vector<std::string> ExportSite(const Site& site, const fs::path& out, LogRe
   const LoggedOptions logged = ReadLoggedOptions({site.journal()}, readings);
   {
     Progress progress("pangea-site");
-    session::Replay({site.journal()}, logged.options, std::numeric_limits<double>::infinity(),
-                    replayed, progress, readings);
+    Replay({site.journal()}, logged.options, std::numeric_limits<double>::infinity(), replayed,
+           progress, readings);
   }
-  std::vector<std::string> files = session::ExportTum(replayed, out);
+  std::vector<std::string> files = ExportTum(replayed, out);
   files.push_back(out / "map.ply");
-  session::ExportPly(replayed, files.back());
-  const session::LoggedAnchors anchors = session::ReadAnchors(replayed);
+  ExportPly(replayed, files.back());
+  const LoggedAnchors anchors = ReadAnchors(replayed);
   if (!anchors.anchors.empty()) {
     files.push_back(out / "anchors.json");
-    WriteTextFile(files.back(), session::ToJson(anchors));
+    WriteTextFile(files.back(), ToJson(anchors));
     files.push_back(out / "map.gltf");
-    session::ExportGltf(replayed, anchors, files.back());
+    ExportGltf(replayed, anchors, files.back());
   }
   fs::remove(replayed);
   folder.Keep();

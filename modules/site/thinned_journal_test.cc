@@ -69,7 +69,7 @@ TEST(ThinnedJournal, SaysNothingOfKeyframesThatWent) {
   }
   EXPECT_EQ(matched.size(), num_keyframes) << "each has its match";
   // A replay accepts the journal: edges lead over the gaps.
-  EXPECT_EQ(session::ReadKeyframeLog(site.journal()).size(), num_keyframes);
+  EXPECT_EQ(ReadKeyframeLog(site.journal()).size(), num_keyframes);
 }
 
 TEST(ThinnedJournal, ThinnedAgainItStaysAsItIs) {

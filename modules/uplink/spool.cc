@@ -244,7 +244,7 @@ void Spool::Release(const MapId& map, int32_t seq) {
 void Spool::RemoveIfRead(int64_t number) {
   const Segment& segment = segments_.at(number);
   const bool written_to = number == newest_ && fd_ >= 0;
-  if (segment.kept > 0 || (written_to && segment.bytes < kLeastSegmentBytes)) {
+  if (segment.kept > 0 || (written_to && segment.bytes < kMinSegmentBytes)) {
     return;
   }
   if (written_to) {

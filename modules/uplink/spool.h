@@ -34,7 +34,7 @@ class Spool {
   static constexpr int64_t kSegmentBytes = 16 << 20;
   // The segment that is being written is not removed before it has this size, even if all its
   // keyframes are acknowledged; else a connected agent would make one file per keyframe.
-  static constexpr int64_t kLeastSegmentBytes = 1 << 20;
+  static constexpr int64_t kMinSegmentBytes = 1 << 20;
 
   // Creates the folder, or finds the keyframes of an earlier run. Throws std::runtime_error if the
   // folder cannot be used, is used by another process, or has keyframes of another agent.

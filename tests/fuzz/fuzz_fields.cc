@@ -39,14 +39,14 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const int64_t fingerprint = schemas[data[0] % schemas.size()].fingerprint;
   std::vector<uint8_t> bytes(data + 1, data + size);
   fuzz::SetFingerprint(fingerprint, &bytes);
-  const auto message = session::DecodeFields(bytes);
+  const auto message = DecodeFields(bytes);
   if (const auto decodes = decoders.find(fingerprint); decodes != decoders.end()) {
     fuzz::Require(decodes->second(bytes) == message.has_value(), "the fields are lcm-gen's");
   }
   if (message) {
-    fuzz::Require(session::TypeOf(bytes) == message->type, "what decodes has a type");
+    fuzz::Require(TypeOf(bytes) == message->type, "what decodes has a type");
     fuzz::Require(message->fields.size() <= bytes.size(), "no field without a byte");
-    fuzz::Require(!session::ToJson(*message).dump().empty(), "texts are UTF-8");
+    fuzz::Require(!ToJson(*message).dump().empty(), "texts are UTF-8");
   }
   return 0;
 }

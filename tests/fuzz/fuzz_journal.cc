@@ -57,8 +57,8 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const auto log = folder / "journal.lcm";
   fuzz::WriteFile(log, {data, size});
   LogReadings readings;
-  fuzz::Opens([&] { session::ReadKeyframeLog(log, &readings); });
-  fuzz::Opens([&] { session::ReadKeyframeLogOf(log, 1, &readings); });
+  fuzz::Opens([&] { ReadKeyframeLog(log, &readings); });
+  fuzz::Opens([&] { ReadKeyframeLogOf(log, 1, &readings); });
   if (fuzz::Opens([&] { fuzz::StartOn(log); })) {
     const std::vector<char> healed = fuzz::BytesOf(log);
     const int64_t files = fuzz::NumFiles(folder);

@@ -15,13 +15,13 @@ namespace pangea {
 namespace {
 
 // An event with one letter of the channel's name and no data.
-constexpr int64_t kLeastEventBytes = static_cast<int64_t>(LogEventHeader::kBytes) + 1;
+constexpr int64_t kMinEventBytes = static_cast<int64_t>(LogEventHeader::kBytes) + 1;
 
 int64_t Size(const DamagedPart& part) { return part.range.end - part.range.begin; }
 
 bool IsFilled(int fd, const DamagedPart& part) {
   std::vector<uint8_t> bytes(static_cast<size_t>(Size(part)));
-  return Size(part) < kLeastEventBytes &&
+  return Size(part) < kMinEventBytes &&
          ReadFully(fd, part.range.begin, bytes.data(), bytes.size()) &&
          std::ranges::all_of(bytes, [](uint8_t byte) { return byte == 0; });
 }
@@ -42,7 +42,7 @@ bool WriteDamagedEvent(int fd, int64_t offset, int64_t size, const DamagedPart& 
 }
 
 bool Fill(int fd, const DamagedPart& part) {
-  if (Size(part) < kLeastEventBytes) {
+  if (Size(part) < kMinEventBytes) {
     const std::vector<uint8_t> zeros(static_cast<size_t>(Size(part)));
     return WriteFully(fd, part.range.begin, zeros.data(), zeros.size());
   }
@@ -50,7 +50,7 @@ bool Fill(int fd, const DamagedPart& part) {
     const int64_t left = part.range.end - at;
     const int64_t size = left <= LogEventHeader::kMaxDataBytes
                              ? left
-                             : LogEventHeader::kMaxDataBytes - kLeastEventBytes;
+                             : LogEventHeader::kMaxDataBytes - kMinEventBytes;
     if (!WriteDamagedEvent(fd, at, size, part)) {
       return false;
     }

@@ -63,8 +63,8 @@ void JournalFollower::SaveFollower(ByteWriter* writer) const {
 
 bool JournalFollower::RestoreFollower(ByteReader* reader) {
   const auto restore = [reader](auto* stream) {
-    constexpr size_t kLeastBytes = 20;
-    for (size_t left = reader->GetCount(kLeastBytes); left > 0; --left) {
+    constexpr size_t kMinBytes = 20;
+    for (size_t left = reader->GetCount(kMinBytes); left > 0; --left) {
       MapId map;
       int32_t next = 0;
       std::vector<int32_t> waiting;

@@ -19,11 +19,11 @@ struct ImuSample {
 };
 
 // Larger values come from a broken sensor or a wrong unit, not from a phone in a hand.
-inline constexpr double kMostGyro = 100;   // rad/s
-inline constexpr double kMostAccel = 500;  // m/s^2
+inline constexpr double kMaxGyro = 100;   // rad/s
+inline constexpr double kMaxAccel = 500;  // m/s^2
 inline bool IsPlausible(const ImuSample& sample) {
-  return sample.gyro.allFinite() && sample.accel.allFinite() && sample.gyro.norm() <= kMostGyro &&
-         sample.accel.norm() <= kMostAccel;
+  return sample.gyro.allFinite() && sample.accel.allFinite() && sample.gyro.norm() <= kMaxGyro &&
+         sample.accel.norm() <= kMaxAccel;
 }
 
 struct ImuNoise {

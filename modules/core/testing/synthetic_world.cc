@@ -294,7 +294,7 @@ Constraint MakeFalseConstraint(const SyntheticWorld& world, const KeyframeId& fr
 
 std::vector<KeyframePair> OverlappingPairs(const SyntheticWorld& world, double distance_m,
                                            int min_seq_gap) {
-  constexpr double kLeastViewCosine = 0.8;
+  constexpr double kMinViewCosine = 0.8;
   std::vector<const Keyframe*> keyframes;
   for (const SyntheticAgent& agent : world.agents) {
     for (const Keyframe& keyframe : agent.keyframes) {
@@ -310,7 +310,7 @@ std::vector<KeyframePair> OverlappingPairs(const SyntheticWorld& world, double d
                           keyframes[j]->id.seq - keyframes[i]->id.seq < min_seq_gap;
       const double view_cosine =
           (T_i.q * Eigen::Vector3d::UnitX()).dot(T_j.q * Eigen::Vector3d::UnitX());
-      if (!recent && (T_i.t - T_j.t).norm() < distance_m && view_cosine > kLeastViewCosine) {
+      if (!recent && (T_i.t - T_j.t).norm() < distance_m && view_cosine > kMinViewCosine) {
         pairs.push_back({keyframes[i]->id, keyframes[j]->id});
       }
     }

@@ -13,24 +13,24 @@ BaBlocks::BaBlocks(const BaWorld& world)
     : num_keyframes_(static_cast<int>(world.keyframes.size())),
       num_cameras_(static_cast<int>(world.cameras.size())) {
   for (const BaKeyframe& keyframe : world.keyframes) {
-    PoseToBlock(keyframe.imu.T_odom_body, Add(kPoseSize, kPoseTangentSize, keyframe.held));
+    PoseToBlock(keyframe.state.T_map_body, Add(kPoseSize, kPoseTangentSize, keyframe.fixed));
   }
   for (const BaKeyframe& keyframe : world.keyframes) {
-    Eigen::Map<MotionBlock>(Add(kMotionSize, kMotionSize, keyframe.held))
-        << keyframe.imu.v_odom_body,
-        keyframe.imu.gyro_bias, keyframe.imu.accel_bias;
+    Eigen::Map<SpeedBiasBlock>(Add(kMotionSize, kMotionSize, keyframe.fixed))
+        << keyframe.state.v_map_body,
+        keyframe.state.gyro_bias, keyframe.state.accel_bias;
   }
   for (const BaCamera& camera : world.cameras) {
-    PoseToBlock(camera.T_body_cam, Add(kPoseSize, kPoseTangentSize, camera.held));
+    PoseToBlock(camera.T_body_cam, Add(kPoseSize, kPoseTangentSize, camera.fixed));
   }
   for (const BaCamera& camera : world.cameras) {
-    *Add(1, 1, camera.held) = camera.held ? camera.edge_log_scale : 0;
+    *Add(1, 1, camera.fixed) = camera.fixed ? camera.edge_log_scale : 0;
   }
 }
 
-double* BaBlocks::Add(int size, int tangent_size, bool held) {
+double* BaBlocks::Add(int size, int tangent_size, bool fixed) {
   const auto first = static_cast<int>(values_.size());
-  blocks_.push_back({first, size, tangent_size, held ? kHeld : num_variables_++});
+  blocks_.push_back({first, size, tangent_size, fixed ? kFixed : num_variables_++});
   values_.resize(values_.size() + size);
   return &values_[first];
 }
@@ -38,7 +38,7 @@ double* BaBlocks::Add(int size, int tangent_size, bool held) {
 std::vector<int> BaBlocks::VariableSizes() const {
   std::vector<int> sizes;
   for (const Block& block : blocks_) {
-    if (block.variable != kHeld) {
+    if (block.variable != kFixed) {
       sizes.push_back(block.tangent_size);
     }
   }
@@ -47,7 +47,7 @@ std::vector<int> BaBlocks::VariableSizes() const {
 
 void BaBlocks::Move(const Eigen::VectorXd& step, const BlockEquations& equations) {
   for (const Block& block : blocks_) {
-    if (block.variable == kHeld) {
+    if (block.variable == kFixed) {
       continue;
     }
     const auto moved = step.segment(equations.ColumnOf(block.variable), block.tangent_size);
@@ -62,7 +62,7 @@ void BaBlocks::Move(const Eigen::VectorXd& step, const BlockEquations& equations
 
 void BaBlocks::ReadBack(BaWorld* world) const {
   for (int i = 0; i < num_keyframes_; ++i) {
-    world->keyframes[i].imu = StateFromBlocks((*this)[Pose(i)], (*this)[Motion(i)]);
+    world->keyframes[i].state = StateFromBlocks((*this)[Pose(i)], (*this)[Motion(i)]);
   }
   for (int i = 0; i < num_cameras_; ++i) {
     world->cameras[i].T_body_cam = PoseFromBlock((*this)[Camera(i)]);

@@ -7,17 +7,17 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "block_equations/block_equations.h"
 #include "global_ba/ba_world.h"
-#include "least_squares/block_equations.h"
 
 namespace pangea {
 
 class BaBlocks {
  public:
-  static constexpr int kHeld = -1;
+  static constexpr int kFixed = -1;
   struct Block {
     int first = 0, size = 0, tangent_size = 0;  // first, size: in values_
-    int variable = kHeld;
+    int variable = kFixed;
   };
 
   explicit BaBlocks(const BaWorld& world);
@@ -36,7 +36,7 @@ class BaBlocks {
 
  private:
   // Appends a block and returns its values, to be filled in.
-  double* Add(int size, int tangent_size, bool held);
+  double* Add(int size, int tangent_size, bool fixed);
 
   int num_keyframes_ = 0, num_cameras_ = 0, num_variables_ = 0;
   std::vector<Block> blocks_;

@@ -61,12 +61,12 @@ class Reference {
   void AddKeyframes() {
     for (int i = 0; i < static_cast<int>(world_->keyframes.size()); ++i) {
       const BaKeyframe& keyframe = world_->keyframes[i];
-      PoseToBlock(keyframe.imu.T_odom_body, Pose(i));
-      Eigen::Map<MotionBlock>(Motion(i)) << keyframe.imu.v_odom_body, keyframe.imu.gyro_bias,
-          keyframe.imu.accel_bias;
+      PoseToBlock(keyframe.state.T_map_body, Pose(i));
+      Eigen::Map<SpeedBiasBlock>(Motion(i)) << keyframe.state.v_map_body, keyframe.state.gyro_bias,
+          keyframe.state.accel_bias;
       problem_.AddParameterBlock(Pose(i), 7, new RigidManifold);
       problem_.AddParameterBlock(Motion(i), 9);
-      if (keyframe.held) {
+      if (keyframe.fixed) {
         problem_.SetParameterBlockConstant(Pose(i));
         problem_.SetParameterBlockConstant(Motion(i));
       }
@@ -88,9 +88,9 @@ class Reference {
           Motion(i));
     }
     if (const auto& edge = keyframe.edge) {
-      const auto metres = has_imu ? EdgeResidual::Metres::kWorld : EdgeResidual::Metres::kOdometry;
+      const auto scale = has_imu ? EdgeResidual::Scale::kMap : EdgeResidual::Scale::kOdometry;
       problem_.AddResidualBlock(
-          new EdgeFactor(EdgeResidual(edge->T_previous_this, edge->covariance, metres)),
+          new EdgeFactor(EdgeResidual(edge->T_previous_this, edge->covariance, scale)),
           Weight(has_imu ? kEdgeWeight : 1), Pose(previous), Pose(i), &scales_[keyframe.camera]);
     }
   }
@@ -104,7 +104,7 @@ class Reference {
                                                       kCameraPositionSigma_m, kCameraRotationSigma),
                                 nullptr, Camera(i));
       problem_.AddResidualBlock(new ScalePriorFactor(kEdgeScaleSigma), nullptr, &scales_[i]);
-      if (camera.held) {
+      if (camera.fixed) {
         scales_[i] = camera.edge_log_scale;
         problem_.SetParameterBlockConstant(Camera(i));
         problem_.SetParameterBlockConstant(&scales_[i]);
@@ -114,7 +114,7 @@ class Reference {
 
   void ReadBack() {
     for (int i = 0; i < static_cast<int>(world_->keyframes.size()); ++i) {
-      world_->keyframes[i].imu = StateFromBlocks(Pose(i), Motion(i));
+      world_->keyframes[i].state = StateFromBlocks(Pose(i), Motion(i));
     }
     for (int i = 0; i < static_cast<int>(world_->cameras.size()); ++i) {
       world_->cameras[i].T_body_cam = PoseFromBlock(Camera(i));

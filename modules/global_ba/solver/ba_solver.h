@@ -2,19 +2,19 @@
 
 // Levenberg-Marquardt on a bundle adjustment's world: landmarks are eliminated
 // (eliminated_landmarks.h), and the rest is solved by sparse Cholesky
-// (least_squares/block_equations.h).
+// (block_equations/block_equations.h).
 
 #include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
 
+#include "block_equations/block_equations.h"
 #include "core/least_squares/robust_loss.h"
 #include "global_ba/ba_options.h"
 #include "global_ba/solver/ba_blocks.h"
 #include "global_ba/solver/block_factors.h"
 #include "global_ba/solver/eliminated_landmarks.h"
-#include "least_squares/block_equations.h"
 
 namespace pangea {
 

@@ -21,7 +21,7 @@ double SolveOwn(BaWorld* world) {
 }
 
 // With fixed keyframes the gauge is fixed, and the minimum is unique.
-BaWorld HeldWorld(uint64_t seed, bool cameras_held) {
+BaWorld FixedWorld(uint64_t seed, bool cameras_fixed) {
   BaWorld world = MakeBaTestWorld({.seed = seed,
                                    .landmarks = 60,
                                    .outlier_share = 0.02,
@@ -29,29 +29,29 @@ BaWorld HeldWorld(uint64_t seed, bool cameras_held) {
                                    .edge_scale_error = 0.01})
                       .start;
   for (BaKeyframe& keyframe : world.keyframes) {
-    keyframe.held = keyframe.id.seq % 10 < 2;
+    keyframe.fixed = keyframe.id.seq % 10 < 2;
     if (keyframe.id.seq % 10 == 6) {
       keyframe.preintegration.reset();
     }
   }
   for (BaCamera& camera : world.cameras) {
-    camera.held = cameras_held;
-    camera.edge_log_scale = cameras_held ? 0.005 : 0;
+    camera.fixed = cameras_fixed;
+    camera.edge_log_scale = cameras_fixed ? 0.005 : 0;
   }
   return world;
 }
 
 TEST(BaSolver, FindsTheMinimumOfCeres) {
-  for (const bool cameras_held : {false, true}) {
+  for (const bool cameras_fixed : {false, true}) {
     for (uint64_t seed = 1; seed <= 3; ++seed) {
-      BaWorld own = HeldWorld(seed, cameras_held), reference = own;
+      BaWorld own = FixedWorld(seed, cameras_fixed), reference = own;
       const double expected =
           SolveByCeres(BaOptions{}, new ceres::HuberLoss(kLossScale), &reference);
       EXPECT_NEAR(SolveOwn(&own) / expected, 1, 1e-7);
       for (size_t i = 0; i < own.keyframes.size(); ++i) {
-        const ImuState &a = own.keyframes[i].imu, &b = reference.keyframes[i].imu;
-        EXPECT_LT((a.T_odom_body.Minus(b.T_odom_body)).norm(), 1e-5);
-        EXPECT_LT((a.v_odom_body - b.v_odom_body).norm(), 1e-4);
+        const KeyframeState &a = own.keyframes[i].state, &b = reference.keyframes[i].state;
+        EXPECT_LT((a.T_map_body.Minus(b.T_map_body)).norm(), 1e-5);
+        EXPECT_LT((a.v_map_body - b.v_map_body).norm(), 1e-4);
         EXPECT_LT((a.accel_bias - b.accel_bias).norm(), 1e-4);
       }
       for (size_t i = 0; i < own.cameras.size(); ++i) {
@@ -64,9 +64,9 @@ TEST(BaSolver, FindsTheMinimumOfCeres) {
 
 // With all keyframes and cameras fixed, each landmark is independent.
 TEST(BaSolver, MovesLandmarksWhereAllElseIsHeld) {
-  BaWorld own = HeldWorld(1, true);
+  BaWorld own = FixedWorld(1, true);
   for (BaKeyframe& keyframe : own.keyframes) {
-    keyframe.held = true;
+    keyframe.fixed = true;
   }
   BaWorld reference = own;
   const double expected = SolveByCeres(BaOptions{}, new ceres::HuberLoss(kLossScale), &reference);
@@ -74,7 +74,7 @@ TEST(BaSolver, MovesLandmarksWhereAllElseIsHeld) {
 }
 
 TEST(BaSolver, ALandmarkBehindAllItsCamerasStays) {
-  BaWorld world = HeldWorld(1, true);
+  BaWorld world = FixedWorld(1, true);
   const int landmark = world.observations.front().landmark;
   world.landmarks[landmark] = {0, 0, 1e4};
   BaSolver solver(world, BaOptions{}, {.kind = RobustLoss::Kind::kHuber, .scale = kLossScale});

@@ -58,10 +58,10 @@ void BlockFactors::AddEdges(const BaWorld& world, const BaBlocks& blocks) {
     if (keyframe.previous >= 0 && keyframe.edge) {
       const bool has_imu = keyframe.preintegration.has_value();
       // Without the IMU, edges may alone determine the scale (core/least_squares/edge_residual.h).
-      const auto metres = has_imu && keyframe.unknown_scale == 0 ? EdgeResidual::Metres::kWorld
-                                                                 : EdgeResidual::Metres::kOdometry;
+      const auto scale = has_imu && keyframe.unknown_scale == 0 ? EdgeResidual::Scale::kMap
+                                                                : EdgeResidual::Scale::kOdometry;
       const BaEdge& edge = *keyframe.edge;
-      Add(new EdgeFactor(EdgeResidual(edge.T_previous_this, edge.covariance, metres)),
+      Add(new EdgeFactor(EdgeResidual(edge.T_previous_this, edge.covariance, scale)),
           has_imu ? kEdgeWeight : 1,
           {blocks.Pose(keyframe.previous), blocks.Pose(i), blocks.EdgeLogScale(keyframe.camera)});
     }
@@ -85,14 +85,14 @@ void BlockFactors::AddCliques(const BaBlocks& blocks, std::vector<std::vector<in
   for (Factor& factor : factors_) {
     std::vector<int> clique;
     for (const int index : factor.blocks) {
-      if (blocks.block(index).variable != BaBlocks::kHeld) {
+      if (blocks.block(index).variable != BaBlocks::kFixed) {
         clique.push_back(blocks.block(index).variable);
       }
     }
     std::ranges::sort(clique);
     for (const int index : factor.blocks) {
       const auto member = std::ranges::find(clique, blocks.block(index).variable);
-      factor.members.push_back(member == clique.end() ? BaBlocks::kHeld
+      factor.members.push_back(member == clique.end() ? BaBlocks::kFixed
                                                       : static_cast<int>(member - clique.begin()));
     }
     factor.clique = cliques->size();
@@ -124,7 +124,7 @@ void BlockFactors::AddFactor(const Factor& factor, const BaBlocks& blocks,
   std::array<double*, kMaxBlocks> jacobians{};
   const size_t count = factor.blocks.size();
   for (size_t k = 0; k < count; ++k) {
-    if (factor.members[k] != BaBlocks::kHeld) {
+    if (factor.members[k] != BaBlocks::kFixed) {
       J[k].resize(num_rows, blocks.block(factor.blocks[k]).size);
       jacobians[k] = J[k].data();
     }
@@ -133,7 +133,7 @@ void BlockFactors::AddFactor(const Factor& factor, const BaBlocks& blocks,
                         jacobians.data());
   const auto r = residuals.head(num_rows);
   for (size_t a = 0; a < count; ++a) {
-    if (factor.members[a] == BaBlocks::kHeld) {
+    if (factor.members[a] == BaBlocks::kFixed) {
       continue;
     }
     const BaBlocks::Block& block_a = blocks.block(factor.blocks[a]);
@@ -141,7 +141,7 @@ void BlockFactors::AddFactor(const Factor& factor, const BaBlocks& blocks,
     equations->g().segment(equations->ColumnOf(block_a.variable), block_a.tangent_size) +=
         factor.weight * (J_a.transpose() * r);
     for (size_t b = 0; b < count; ++b) {
-      if (factor.members[b] != BaBlocks::kHeld && factor.members[b] <= factor.members[a]) {
+      if (factor.members[b] != BaBlocks::kFixed && factor.members[b] <= factor.members[a]) {
         const auto J_b = J[b].leftCols(blocks.block(factor.blocks[b]).tangent_size);
         equations->Add(factor.clique, factor.members[a], factor.members[b],
                        factor.weight * (J_a.transpose() * J_b));

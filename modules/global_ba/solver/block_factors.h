@@ -9,9 +9,9 @@
 #include <memory>
 #include <vector>
 
+#include "block_equations/block_equations.h"
 #include "global_ba/ba_options.h"
 #include "global_ba/solver/ba_blocks.h"
-#include "least_squares/block_equations.h"
 
 namespace pangea {
 

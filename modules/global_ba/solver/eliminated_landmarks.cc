@@ -18,7 +18,7 @@ using Matrix26 = Eigen::Matrix<double, 2, 6>;
 constexpr double kMinDepth_m = 0.05;
 constexpr double kBehind = 20;  // sigmas
 // Keeps a landmark that is behind all its cameras where it is.
-constexpr double kLeastInformation = 1e-9;  // 1/m^2
+constexpr double kMinInformation = 1e-9;  // 1/m^2
 
 struct Linearised {
   Vector2d r;
@@ -76,7 +76,7 @@ EliminatedLandmarks::EliminatedLandmarks(const BaWorld& world,
            observations_[next].seen.landmark == static_cast<int>(landmark);
          ++next) {
       for (const int variable : {body_of(observations_[next]), camera_of(observations_[next])}) {
-        if (variable != kHeld) {
+        if (variable != kFixed) {
           clique.push_back(variable);
         }
       }
@@ -85,8 +85,8 @@ EliminatedLandmarks::EliminatedLandmarks(const BaWorld& world,
     clique.erase(std::unique(clique.begin(), clique.end()), clique.end());
     for (size_t i = first_observation_.back(); i < next; ++i) {
       const int body = body_of(observations_[i]), camera = camera_of(observations_[i]);
-      observations_[i].body = body == kHeld ? kHeld : MemberOf(clique, body);
-      observations_[i].camera = camera == kHeld ? kHeld : MemberOf(clique, camera);
+      observations_[i].body = body == kFixed ? kFixed : MemberOf(clique, body);
+      observations_[i].camera = camera == kFixed ? kFixed : MemberOf(clique, camera);
     }
     first_cross_block_.push_back(num_cross_blocks);
     num_cross_blocks += clique.size();
@@ -134,7 +134,7 @@ void EliminatedLandmarks::Gather(size_t landmark, const std::vector<View>& views
   const std::vector<int>& clique = cliques_[landmark];
   CrossBlock* const cross_blocks = cross_blocks_.data() + first_cross_block_[landmark];
   std::fill_n(cross_blocks, clique.size(), CrossBlock::Zero());
-  Matrix3d information = Matrix3d::Identity() * kLeastInformation;
+  Matrix3d information = Matrix3d::Identity() * kMinInformation;
   Vector3d gradient = Vector3d::Zero();
   for (size_t i = first_observation_[landmark]; i < first_observation_[landmark + 1]; ++i) {
     const Observation& observation = observations_[i];
@@ -151,15 +151,15 @@ void EliminatedLandmarks::Gather(size_t landmark, const std::vector<View>& views
       cross_blocks[member] += J.transpose() * J_variable;
     };
     Matrix26 J_body, J_camera;
-    if (observation.body != kHeld) {
+    if (observation.body != kFixed) {
       J_body << -J, J * Hat(point - view.p_map_body);
       add(observation.body, J_body);
     }
-    if (observation.camera != kHeld) {
+    if (observation.camera != kFixed) {
       J_camera << -J * view.R_map_body, J * Hat(point - view.p_map_cam) * view.R_map_body;
       add(observation.camera, J_camera);
     }
-    if (observation.body != kHeld && observation.camera != kHeld) {
+    if (observation.body != kFixed && observation.camera != kFixed) {
       equations->Add(landmark, observation.camera, observation.body, J_camera.transpose() * J_body);
     }
   }

@@ -16,9 +16,9 @@
 #include <cstddef>
 #include <vector>
 
+#include "block_equations/block_equations.h"
 #include "core/least_squares/robust_loss.h"
 #include "global_ba/ba_world.h"
-#include "least_squares/block_equations.h"
 
 namespace pangea {
 
@@ -58,10 +58,10 @@ class EliminatedLandmarks {
             std::vector<Eigen::Vector3d>* landmarks) const;
 
  private:
-  static constexpr int kHeld = -1;
+  static constexpr int kFixed = -1;
   struct Observation {
     BaObservation seen;
-    int body = kHeld, camera = kHeld;  // indices in the landmark's clique
+    int body = kFixed, camera = kFixed;  // indices in the landmark's clique
   };
   // L L^T: the landmark's own information matrix; d: L^-1 times its gradient.
   struct LandmarkBlock {

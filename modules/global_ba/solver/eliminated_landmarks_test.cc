@@ -37,7 +37,7 @@ class EliminatedLandmarksTest : public ::testing::Test {
     for (int i = 0; i < num_keyframes_; ++i) {
       const int camera = world_.keyframes[i].camera;
       views.emplace_back(
-          world_.keyframes[i].imu.T_odom_body.Plus(offset.segment<6>(6 * i)),
+          world_.keyframes[i].state.T_map_body.Plus(offset.segment<6>(6 * i)),
           world_.cameras[camera].T_body_cam.Plus(offset.segment<6>(6 * (num_keyframes_ + camera))));
     }
     return views;

@@ -106,7 +106,7 @@ TEST_F(JointBaTest, CovarianceOfSureLandmarks) {
 TEST_F(JointBaTest, MapsThatAreNotMetricDoubtTheDistance) {
   constexpr double kSigma = 0.3;
   const auto relative_sigma = [&](bool m_is_metric) {
-    SubmapStore store;
+    KeyframeStore store;
     WindowPair windows;
     for (const auto& [window, map, is_metric] :
          {std::tuple(&windows.m, MapId{1, 1000}, m_is_metric),

@@ -44,7 +44,7 @@ class JointBaTestWindows : public testing::Test {
     options_.max_chi2 = options_.max_depth_chi2 = 1e3;
   }
 
-  SubmapStore store_;
+  KeyframeStore store_;
   WindowPair windows_;
   Rigid3 T_m_c_;
   std::vector<PointMatch> matches_;

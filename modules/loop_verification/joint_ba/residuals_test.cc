@@ -40,8 +40,8 @@ TEST(EdgeResidual, JacobianWithACorrelatedCovariance) {
     const Rigid3 T_from = RandomPose(random, 2, 5), T_from_to = RandomPose(random, 0.5, 1);
     const Rigid3 T_to = T_from * T_from_to * RandomPose(random, 0.1, 0.1);
     const double kappa = Uniform(random, -0.3, 0.3);
-    for (const auto metres : {EdgeResidual::Metres::kWorld, EdgeResidual::Metres::kOdometry}) {
-      const EdgeResidual edge(T_from_to, RandomCovariance(random), metres);
+    for (const auto scale : {EdgeResidual::Scale::kMap, EdgeResidual::Scale::kOdometry}) {
+      const EdgeResidual edge(T_from_to, RandomCovariance(random), scale);
       EdgeResidual::Jacobians J;
       const Vector6d r = edge.Evaluate(T_from, T_to, kappa, &J);
       Eigen::Matrix<double, 6, 13> analytic;

@@ -14,8 +14,8 @@ Correction CorrectionOf(const GraphMap& map, const RefinedMap& told) {
   correction.map = map.id;
   correction.seq = node.seq;
   correction.T_map_odom = (told.Shift(newest) * map.RigidAt(newest)).ToRigid3();
-  constexpr double kLeastVariance = 1e-12;
-  correction.covariance = kLeastVariance * Matrix6d::Identity();
+  constexpr double kMinVariance = 1e-12;
+  correction.covariance = kMinVariance * Matrix6d::Identity();
   correction.covariance.topLeftCorner<3, 3>() += map.covariance.topLeftCorner<3, 3>();
   correction.covariance.block<3, 1>(0, 5) += map.covariance.topRightCorner<3, 1>();
   correction.covariance.block<1, 3>(5, 0) += map.covariance.bottomLeftCorner<1, 3>();

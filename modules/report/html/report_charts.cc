@@ -6,7 +6,7 @@
 #include <functional>
 #include <map>
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 constexpr int kChartHeight = 480;
@@ -156,4 +156,4 @@ Plot TrafficChart(const CapturedSession& session, const ReportMetrics& metrics) 
   return plot;
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

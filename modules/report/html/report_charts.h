@@ -5,7 +5,7 @@
 #include "eval/plot.h"
 #include "report/metrics/report_metrics.h"
 
-namespace pangea::session {
+namespace pangea {
 
 // One bar per map, from its first keyframe to its last, in the colour of the agent whose map frame
 // it is in; a line marks a change.
@@ -18,4 +18,4 @@ Plot LoadChart(const CapturedSession& session, const ReportMetrics& metrics);
 // measured: a replay has no link.
 Plot TrafficChart(const CapturedSession& session, const ReportMetrics& metrics);
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -10,7 +10,7 @@
 #include "report/report_pictures.h"
 #include "report/report_tables.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 // The content security policy forbids all requests and every script except this one, identified by
@@ -260,4 +260,4 @@ std::string WithSection(std::string page, const std::string& id, const std::stri
   return page.insert(page.rfind(kEnd), Section(id, title, table.Html()));
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

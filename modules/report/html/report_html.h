@@ -7,7 +7,7 @@
 #include "eval/table.h"
 #include "report/metrics/report_metrics.h"
 
-namespace pangea::session {
+namespace pangea {
 
 // `anchors_jpeg`: from AnchorsJpeg; empty for none.
 std::string ReportHtml(const ReportInput& input, const CapturedSession& session,
@@ -17,4 +17,4 @@ std::string ReportHtml(const ReportInput& input, const CapturedSession& session,
 std::string WithSection(std::string page, const std::string& id, const std::string& title,
                         const Table& table);
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -16,7 +16,7 @@
 #include "report/metrics/report_paper.h"
 #include "report/report_test_world.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 using boost::property_tree::ptree;
@@ -244,4 +244,4 @@ TEST(ReportPaper, HalvesOfOneStandInTableIII) {
 }
 
 }  // namespace
-}  // namespace pangea::session
+}  // namespace pangea

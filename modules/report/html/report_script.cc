@@ -1,6 +1,6 @@
 #include "report/html/report_svg.h"
 
-namespace pangea::session {
+namespace pangea {
 
 // CDATA, because tests parse the page as XML.
 const char* const kChartScript = R"js(//<![CDATA[
@@ -143,4 +143,4 @@ class Chart {
 for (const figure of document.querySelectorAll(".chart")) new Chart(figure);
 //]]>)js";
 
-}  // namespace pangea::session
+}  // namespace pangea

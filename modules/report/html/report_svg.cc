@@ -9,7 +9,7 @@
 
 #include "eval/table.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 constexpr double kWidth = 1000;
@@ -223,4 +223,4 @@ std::string ChartHtml(const Plot& plot, const std::string& what) {
   return html + "</svg>\n<output class=\"tip\" hidden=\"\"></output>\n</figure>\n";
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -7,7 +7,7 @@
 
 #include "eval/plot.h"
 
-namespace pangea::session {
+namespace pangea {
 
 // A figure with title, legend and drawing; `what` is its description for screen readers. `data-x`
 // and `data-y` contain the ranges of the axes as "low high from to"; from and to are in units of
@@ -17,4 +17,4 @@ std::string ChartHtml(const Plot& plot, const std::string& what);
 // The page's script, for hovering and legends. It reads only the drawings.
 extern const char* const kChartScript;
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -10,7 +10,7 @@
 #include <cmath>
 #include <sstream>
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 using boost::property_tree::ptree;
@@ -154,4 +154,4 @@ TEST(ReportSvg, NothingAndASinglePointAreDrawnToo) {
 }
 
 }  // namespace
-}  // namespace pangea::session
+}  // namespace pangea

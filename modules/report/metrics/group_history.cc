@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 bool Together(const std::map<MapId, size_t>& group_of, const MapId& map, int32_t agent) {
@@ -53,4 +53,4 @@ std::optional<int64_t> GroupHistory::TogetherSince(const MapId& map, int32_t age
   return since;
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

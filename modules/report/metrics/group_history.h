@@ -9,7 +9,7 @@
 
 #include "report/report_log.h"
 
-namespace pangea::session {
+namespace pangea {
 
 class GroupHistory {
  public:
@@ -30,4 +30,4 @@ class GroupHistory {
   const CapturedSession& session_;
 };
 
-}  // namespace pangea::session
+}  // namespace pangea

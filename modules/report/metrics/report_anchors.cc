@@ -10,7 +10,7 @@
 #include "eval/metrics.h"
 #include "report/metrics/group_history.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 // Largest gap between the poses around a placement, and between frames for a jump.
@@ -384,4 +384,4 @@ std::vector<AnchorMetrics> AnchorsOf(const CapturedSession& session,
   return anchors;
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

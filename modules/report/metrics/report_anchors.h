@@ -21,7 +21,7 @@
 #include "report/report.h"
 #include "report/report_log.h"
 
-namespace pangea::session {
+namespace pangea {
 
 // An anchor in one image.
 struct AnchorView {
@@ -75,4 +75,4 @@ std::vector<AnchorMetrics> AnchorsOf(const CapturedSession& session,
                                      const std::vector<AnchorViewer>& viewers,
                                      const std::vector<WantedAnchor>& wanted);
 
-}  // namespace pangea::session
+}  // namespace pangea

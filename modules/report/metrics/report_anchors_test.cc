@@ -9,7 +9,7 @@
 #include <cmath>
 #include <functional>
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 using testing::HasSubstr;
@@ -315,4 +315,4 @@ TEST(ReportAnchors, WhatWasNeverPlacedIsListed) {
 }
 
 }  // namespace
-}  // namespace pangea::session
+}  // namespace pangea

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cctype>
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 struct Span {
@@ -83,4 +83,4 @@ double RecordingSeconds(const ReportMetrics& metrics, int32_t agent_id, int64_t 
   return 0;
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -8,7 +8,7 @@
 
 #include "report/metrics/report_metrics.h"
 
-namespace pangea::session {
+namespace pangea {
 
 struct ConstraintCounts {
   int accepted_intra = 0;
@@ -25,4 +25,4 @@ std::optional<double> KilobytesPerSecondUp(const AgentMetrics& agent);
 // Time in an agent's recording, seconds since its first image.
 double RecordingSeconds(const ReportMetrics& metrics, int32_t agent_id, int64_t utime);
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -4,7 +4,7 @@
 #include <set>
 #include <tuple>
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 using Poses = std::map<KeyframeId, FinalKeyframe>;
@@ -126,4 +126,4 @@ std::vector<FinalGroup> FinalGroups(const CapturedSession& session) {
   return groups;
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

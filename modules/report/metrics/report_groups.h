@@ -6,7 +6,7 @@
 
 #include "report/report_log.h"
 
-namespace pangea::session {
+namespace pangea {
 
 struct FinalKeyframe {
   KeyframeId id;
@@ -33,4 +33,4 @@ struct FinalGroup {
 // largest first.
 std::vector<FinalGroup> FinalGroups(const CapturedSession& session);
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -5,7 +5,7 @@
 
 #include "eval/metrics.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 using Iterator = std::vector<LivePose>::const_iterator;
@@ -82,4 +82,4 @@ LiveMetrics LiveMetricsOf(const std::vector<LivePose>& poses,
   return {corrected.Rmse(), raw.Rmse(), JumpMax(poses)};
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -9,7 +9,7 @@
 
 #include "report/report_log.h"
 
-namespace pangea::session {
+namespace pangea {
 
 struct LiveMetrics {
   std::optional<double> ate_m;       // of the corrected pose
@@ -30,4 +30,4 @@ LiveMetrics LiveMetricsOf(const std::vector<LivePose>& poses,
                           const std::map<MapId, int64_t>& fused_revision,
                           const Trajectory& ground_truth);
 
-}  // namespace pangea::session
+}  // namespace pangea

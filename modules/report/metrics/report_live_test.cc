@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 const MapId kMap{2, 200};
@@ -89,4 +89,4 @@ TEST(LiveMetrics, UncorrectedPosesHaveNoError) {
 }
 
 }  // namespace
-}  // namespace pangea::session
+}  // namespace pangea

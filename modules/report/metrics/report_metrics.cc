@@ -10,7 +10,7 @@
 
 #include "recording/euroc.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 std::map<int32_t, AgentRun> Runs(const ReportInput& input, const CapturedSession& session) {
@@ -276,4 +276,4 @@ ReportMetrics ComputeMetrics(const ReportInput& input, const CapturedSession& se
   return metrics;
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -14,7 +14,7 @@
 #include "report/report.h"
 #include "report/report_log.h"
 
-namespace pangea::session {
+namespace pangea {
 
 struct AgentMetrics {
   int32_t id = 0;
@@ -64,4 +64,4 @@ struct ReportMetrics {
 ReportMetrics ComputeMetrics(const ReportInput& input, const CapturedSession& session,
                              LogReadings* readings = nullptr);
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <string_view>
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 // bench/accuracy_test.py checks that these values equal those in bench/accuracy_lib/anchors.py.
@@ -145,4 +145,4 @@ std::vector<PaperTable> PaperTables(const ReportMetrics& metrics) {
   return tables;
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -9,7 +9,7 @@
 #include "eval/table.h"
 #include "report/metrics/report_metrics.h"
 
-namespace pangea::session {
+namespace pangea {
 
 // "MH_01" to "MH_05" by the folder's name; empty for any other recording.
 std::optional<std::string> SequenceOf(const std::string& recording);
@@ -22,4 +22,4 @@ struct PaperTable {
 // The tables with at least one row for this session.
 std::vector<PaperTable> PaperTables(const ReportMetrics& metrics);
 
-}  // namespace pangea::session
+}  // namespace pangea

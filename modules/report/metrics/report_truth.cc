@@ -6,7 +6,7 @@
 
 #include "eval/metrics.h"
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 // 99 % quantiles of chi-square with 6, 3 and 1 degrees of freedom.
@@ -98,4 +98,4 @@ ConstraintsTruth CheckConstraints(const std::vector<ConstraintWithTruth>& constr
   return result;
 }
 
-}  // namespace pangea::session
+}  // namespace pangea

@@ -13,7 +13,7 @@
 
 #include "report/report_log.h"
 
-namespace pangea::session {
+namespace pangea {
 
 // A constraint with a larger error in either is wrong: it connects two different places.
 inline constexpr double kWrongTranslation_m = 0.5;
@@ -52,4 +52,4 @@ std::vector<ConstraintWithTruth> ConstraintsWithTruth(
 
 ConstraintsTruth CheckConstraints(const std::vector<ConstraintWithTruth>& constraints);
 
-}  // namespace pangea::session
+}  // namespace pangea

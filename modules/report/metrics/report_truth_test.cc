@@ -6,7 +6,7 @@
 #include <cmath>
 #include <random>
 
-namespace pangea::session {
+namespace pangea {
 namespace {
 
 const MapId kFirst{1, 100};
@@ -125,4 +125,4 @@ TEST(ConstraintsTruth, OnlyAcceptedOnesWithGroundTruthAtBothEndsAreChecked) {
 }
 
 }  // namespace
-}  // namespace pangea::session
+}  // namespace pangea

@@ -24,7 +24,7 @@ constexpr const char* kProcesses[] = {"place_recognition", "posegraph", "inter_m
 constexpr double kFirstAfter_s = 60;
 // A new round begins when the journal has grown by this many bytes and by this share: a round
 // rewrites every checkpoint completely.
-constexpr int64_t kLeastBytes = 20'000'000;
+constexpr int64_t kMinBytes = 20'000'000;
 constexpr int64_t kShare = 20;
 constexpr int kBehindTheServer = 10;
 constexpr std::chrono::milliseconds kLookInterval{20};
@@ -84,7 +84,7 @@ void Checkpoints::Tick(double now_s) {
     return;
   }
   const int64_t bytes = JournalBytes();
-  const bool due = journal_bytes_ ? bytes - *journal_bytes_ >= std::max(kLeastBytes, bytes / kShare)
+  const bool due = journal_bytes_ ? bytes - *journal_bytes_ >= std::max(kMinBytes, bytes / kShare)
                                   : now_s >= *began_s_ + kFirstAfter_s;
   if (due) {
     BeginRound();

@@ -37,7 +37,7 @@ void Say(const std::string& line) {
   std::fflush(stdout);
 }
 
-std::vector<std::string> Command(const std::string& process, const ServerOptions& options) {
+std::vector<std::string> Command(const std::string& process, const ServerSetup& options) {
   std::vector<std::string> argv{ProgramOf(process)};
   if (process == "agent_handler") {
     argv.insert(argv.end(), {"--link", options.link, "--server", options.bus, "--journal",
@@ -64,7 +64,7 @@ std::vector<std::string> Command(const std::string& process, const ServerOptions
   return argv;
 }
 
-std::vector<std::string> GatewayCommand(const ServerOptions& options) {
+std::vector<std::string> GatewayCommand(const ServerSetup& options) {
   return {ProgramOf(kGateway),
           "--site",
           options.site.string(),
@@ -150,7 +150,7 @@ double SteadySeconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-void AddProcessOptions(const std::string& text, ServerOptions* options) {
+void AddProcessOptions(const std::string& text, ServerSetup* options) {
   const size_t equals = text.find('=');
   const std::string process = text.substr(0, equals);
   if (equals == std::string::npos || !IsServerProcess(process)) {
@@ -164,7 +164,7 @@ void AddProcessOptions(const std::string& text, ServerOptions* options) {
   options->options[process] = file;
 }
 
-void AddOptionsFolder(const fs::path& folder, ServerOptions* options) {
+void AddOptionsFolder(const fs::path& folder, ServerSetup* options) {
   if (!fs::is_directory(folder)) {
     throw std::runtime_error(
         fmt::format("--options-dir {}: there is no such folder", folder.string()));
@@ -177,7 +177,7 @@ void AddOptionsFolder(const fs::path& folder, ServerOptions* options) {
   SayUnusedOptions(folder);
 }
 
-int Serve(const ServerOptions& options) {
+int Serve(const ServerSetup& options) {
   InstallSignalHandlers();
   fs::create_directories(options.logs);
   const bool is_core = !options.cluster.nats.empty();
@@ -217,7 +217,7 @@ int Serve(const ServerOptions& options) {
   return given_up ? 1 : 0;
 }
 
-int ServeAsWorker(const ServerOptions& options) {
+int ServeAsWorker(const ServerSetup& options) {
   InstallSignalHandlers();
   fs::create_directories(options.logs);
   KeptProcesses kept(options.logs);

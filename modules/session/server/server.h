@@ -16,7 +16,7 @@
 
 namespace pangea::session {
 
-struct ServerOptions {
+struct ServerSetup {
   std::string bus;
   std::string link;
   std::filesystem::path journal;
@@ -34,9 +34,9 @@ struct ServerOptions {
 };
 
 // Parses "fusion=FILE" into `options`. Throws std::runtime_error with the correction.
-void AddProcessOptions(const std::string& text, ServerOptions* options);
+void AddProcessOptions(const std::string& text, ServerSetup* options);
 // Adds <process>.yaml of each process that has one in the folder; names other files on stdout.
-void AddOptionsFolder(const std::filesystem::path& folder, ServerOptions* options);
+void AddOptionsFolder(const std::filesystem::path& folder, ServerSetup* options);
 
 // The path of a server process' program, in the same directory as this one. Throws
 // std::runtime_error.
@@ -46,9 +46,9 @@ double SteadySeconds();
 // Returns the exit code: 0 after a signal, 1 if a process was given up (kept_processes.h), except a
 // gateway that has run. Prints on stdout what it starts. Throws std::runtime_error if it cannot
 // start.
-int Serve(const ServerOptions& options);
+int Serve(const ServerSetup& options);
 // Runs the verifiers and a bridge for another host's server; uses only bus, logs, options and
 // cluster. Exit code and exceptions as above.
-int ServeAsWorker(const ServerOptions& options);
+int ServeAsWorker(const ServerSetup& options);
 
 }  // namespace pangea::session

@@ -20,7 +20,7 @@ namespace {
 constexpr char kWorkerBusUrl[] = "udpm://239.255.76.67:7701?ttl=0&recv_buf_size=4194304";
 
 struct Arguments {
-  ServerOptions options;
+  ServerSetup options;
   std::string site;
   std::string worker;
   std::string options_folder;
@@ -28,7 +28,7 @@ struct Arguments {
 };
 
 void AddArguments(CLI::App& app, Arguments* arguments) {
-  ServerOptions& options = arguments->options;
+  ServerSetup& options = arguments->options;
   CLI::Option* site = app.add_option(
       "--site", arguments->site,
       "folder of a site: journal, keys, options, logs, buses; made at the first start");
@@ -85,7 +85,7 @@ void AddArguments(CLI::App& app, Arguments* arguments) {
 
 // Takes the values that the command line does not give from the site.
 void UseSite(const site::Site& site, Arguments* arguments) {
-  ServerOptions& options = arguments->options;
+  ServerSetup& options = arguments->options;
   options.site = site.folder;
   options.journal = site.journal();
   options.keys = site.keys();
@@ -96,7 +96,7 @@ void UseSite(const site::Site& site, Arguments* arguments) {
   options.link = options.link.empty() ? site.description.link : options.link;
 }
 
-void UseDefaults(ServerOptions* options) {
+void UseDefaults(ServerSetup* options) {
   if (options->journal.empty() || options->keys.empty()) {
     throw std::runtime_error("give --site FOLDER, or --journal FILE and --keys FOLDER");
   }
@@ -127,7 +127,7 @@ void RequireBus(const std::string& option, const std::string& url) {
 }
 
 int RunWorker(Arguments* arguments) {
-  ServerOptions& options = arguments->options;
+  ServerSetup& options = arguments->options;
   if (options.cluster.nats.empty()) {
     throw std::runtime_error("--worker: give --nats with the URL of the site's NATS");
   }
@@ -145,7 +145,7 @@ int Run(Arguments* arguments) {
     return RunWorker(arguments);
   }
   std::optional<site::SiteLock> lock;
-  ServerOptions& options = arguments->options;
+  ServerSetup& options = arguments->options;
   if (!arguments->site.empty()) {
     const site::Site site = site::OpenSite(arguments->site);
     lock.emplace(site);

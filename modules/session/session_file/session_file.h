@@ -71,13 +71,13 @@ struct AnchorScript {
 };
 
 // Options of the server's processes, including agent_handler, which keeps the journal.
-struct SessionServerOptions : pangea::ServerOptions {
+struct SessionServerOptions : ServerOptions {
   AgentHandlerOptions agent_handler;
 
   template <typename Archive>
   void Visit(Archive& archive) {
     archive.Section("agent_handler", &agent_handler, "");
-    pangea::ServerOptions::Visit(archive);
+    ServerOptions::Visit(archive);
   }
 };
 

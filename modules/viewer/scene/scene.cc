@@ -6,11 +6,11 @@ namespace pangea::viewer {
 namespace {
 
 // If an optimisation moves a keyframe by less than both values, pages are not told.
-constexpr double kLeastMove_m = 5e-4;
-constexpr double kLeastRotation_rad = 5e-4;
+constexpr double kMinMove_m = 5e-4;
+constexpr double kMinRotation_rad = 5e-4;
 
 bool Moved(const Rigid3& from, const Rigid3& to) {
-  return (from.t - to.t).norm() > kLeastMove_m || from.q.angularDistance(to.q) > kLeastRotation_rad;
+  return (from.t - to.t).norm() > kMinMove_m || from.q.angularDistance(to.q) > kMinRotation_rad;
 }
 
 // The index of `key`. A new key is added by `append` if there are fewer than `limit`; else -1.

@@ -29,7 +29,7 @@ constexpr int kCells = 4;
 constexpr int kCellDirections = 8;
 static_assert(kCells * kCells * kCellDirections == kBins);
 constexpr float kCellWidth = 3;  // in the blob's sigmas
-constexpr float kMostOfABin = 0.2F;
+constexpr float kMaxBin = 0.2F;
 constexpr float kLength = 512;
 // Distance between gradient samples, in the blob's sigmas: finer than the image is smooth.
 constexpr float kStep = 0.75F;
@@ -83,7 +83,7 @@ std::vector<WindowSample> GaussianWindow(int half_side, float sigma) {
   return window;
 }
 
-constexpr int kMostSide = 32;  // samples in a row of a patch
+constexpr int kMaxSide = 32;  // samples in a row of a patch
 constexpr int SideOf(int half_side) { return 2 * half_side + 2; }
 
 // Samples the image at equal steps along a row, whose middle is `across` from the centre. Outside
@@ -92,9 +92,9 @@ PANGEA_VECTOR_CLONES
 void InterpolateRow(const cv::Mat& level, const Eigen::Vector2f& centre,
                     const Eigen::Vector2f& along, const Eigen::Vector2f& across,
                     std::span<float> out) {
-  std::array<float, kMostSide> a, b;
-  std::array<int, kMostSide> offset;
-  std::array<float, 2 * kMostSide> upper, lower;  // each pixel and its right neighbour
+  std::array<float, kMaxSide> a, b;
+  std::array<int, kMaxSide> offset;
+  std::array<float, 2 * kMaxSide> upper, lower;  // each pixel and its right neighbour
   const size_t count = out.size();
   const float first = -0.5F * static_cast<float>(count - 1);
   const float right = static_cast<float>(level.cols) - 1.001F,
@@ -169,7 +169,7 @@ float DirectionBin(float gradient_x, float gradient_y, int directions) {
 std::vector<float> DirectionsOf(const ScaleSpace& space, const Blob& blob) {
   constexpr float kSigma = kWindowOfDirection / kStep;  // steps
   constexpr int kHalfSide = static_cast<int>(3 * kSigma);
-  static_assert(SideOf(kHalfSide) <= kMostSide);
+  static_assert(SideOf(kHalfSide) <= kMaxSide);
   static const std::vector<WindowSample> kWindow = GaussianWindow(kHalfSide, kSigma);
   std::array<float, kDirections> raw{}, smooth{};
   GradientPatch(space, blob, 0, kHalfSide)
@@ -223,14 +223,14 @@ void AddGradient(float x, float y, float direction, float weight, Histogram* his
 void Normalise(Histogram* histogram) {
   Eigen::Map<Eigen::Matrix<float, kBins, 1>> bins(histogram->data());
   bins.normalize();
-  bins = bins.cwiseMin(kMostOfABin).eval();
+  bins = bins.cwiseMin(kMaxBin).eval();
   bins *= kLength / bins.norm();
 }
 
 Histogram HistogramOf(const ScaleSpace& space, const Blob& blob, float direction) {
   constexpr float kStepsOfACell = kCellWidth / kStep;
   constexpr int kHalfSide = static_cast<int>((kCells + 1) * kStepsOfACell / 2);
-  static_assert(SideOf(kHalfSide) <= kMostSide);
+  static_assert(SideOf(kHalfSide) <= kMaxSide);
   constexpr float kSigma = kCells * kStepsOfACell / 2;  // of the window
   constexpr float kMiddle = 0.5F * (kCells - 1);
   static const std::vector<WindowSample> kWindow = GaussianWindow(kHalfSide, kSigma);

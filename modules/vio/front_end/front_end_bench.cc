@@ -169,11 +169,11 @@ struct TrackErrors {
 
 // Like the estimator's window: at most 20 views at a time.
 TrackErrors ErrorsOf(const std::map<int32_t, std::vector<View>>& tracks, double pixel_angle) {
-  constexpr size_t kLeastViews = 5, kMostViews = 20;
+  constexpr size_t kMinViews = 5, kMaxViews = 20;
   TrackErrors errors;
   for (const auto& [id, views] : tracks) {
-    for (size_t begin = 0; begin + kLeastViews <= views.size(); begin += kMostViews) {
-      const size_t end = std::min(begin + kMostViews, views.size());
+    for (size_t begin = 0; begin + kMinViews <= views.size(); begin += kMaxViews) {
+      const size_t end = std::min(begin + kMaxViews, views.size());
       const std::vector<double> r = Residuals({views.begin() + static_cast<ptrdiff_t>(begin),
                                                views.begin() + static_cast<ptrdiff_t>(end)});
       ++errors.measured;

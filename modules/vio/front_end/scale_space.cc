@@ -18,7 +18,7 @@ constexpr double kFirstSigma_px = 1.6;
 constexpr double kSigmaOfAnImage_px = 0.5;
 constexpr float kMaxRatioOfCurvatures = 10;
 // Less than Lowe's 0.03, because white walls have little contrast.
-constexpr float kLeastContrast = 0.01F;
+constexpr float kMinBlobContrast = 0.01F;
 constexpr int kRim_px = 5;
 constexpr int kMinSide_px = 24;
 constexpr float kMaxOffset = 0.75F;  // pixels, layers
@@ -102,7 +102,7 @@ std::optional<Blob> Refine(const Layers& differences, int layer, int y, int x) {
     return std::nullopt;
   }
   const float value = differences[layer].at<float>(y, x) + 0.5F * d.gradient.dot(offset);
-  if (std::abs(value) < kLeastContrast || IsEdge(d.hessian)) {
+  if (std::abs(value) < kMinBlobContrast || IsEdge(d.hessian)) {
     return std::nullopt;
   }
   Blob blob;
@@ -118,7 +118,8 @@ std::optional<Blob> Refine(const Layers& differences, int layer, int y, int x) {
 PANGEA_VECTOR_CLONES
 void ComparePixels(const float* above, const float* row, const float* below, int columns,
                    int8_t* sign) {
-  constexpr float kLeast = 0.5F * kLeastContrast;  // half, as the fit may increase a pixel's value
+  constexpr float kLeast =
+      0.5F * kMinBlobContrast;  // half, as the fit may increase a pixel's value
   for (int x = kRim_px; x < columns - kRim_px; ++x) {
     const float most = std::max(std::max(row[x - 1], row[x + 1]), std::max(above[x], below[x]));
     const float least = std::min(std::min(row[x - 1], row[x + 1]), std::min(above[x], below[x]));

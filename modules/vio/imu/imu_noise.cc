@@ -9,15 +9,15 @@ namespace {
 constexpr size_t kMinSamples = 20;  // fewer are not significant
 // Allows for errors that are not white but act as noise: motion between samples, stamps, cross-axis
 // sensitivity. Chosen among 1, 2 and 4 (docs/decisions/imu.md).
-constexpr double kMostShare = 2;
+constexpr double kMaxShare = 2;
 // Noise of usual IMUs (rad/s/sqrt(Hz), m/s^2/sqrt(Hz)): a given value up to this is accepted,
 // whatever a few rounded samples show.
 constexpr double kUsualGyroDensity = 2e-4, kUsualAccelDensity = 2e-3;
 // Range of random walks (rad/s^2/sqrt(Hz), m/s^3/sqrt(Hz)), around those of EuRoC's IMU and of
 // phones. A minute of samples hardly shows them, so the range is chosen: an accelerometer walk that
 // is far too small costs more than one three times too large (docs/decisions/imu.md).
-constexpr double kLeastGyroWalk = 1e-5, kMostGyroWalk = 2e-4;
-constexpr double kLeastAccelWalk = 1e-3, kMostAccelWalk = 3e-3;
+constexpr double kMinGyroWalk = 1e-5, kMaxGyroWalk = 2e-4;
+constexpr double kMinAccelWalk = 1e-3, kMaxAccelWalk = 3e-3;
 
 using Channel = Eigen::Vector3d ImuSample::*;
 
@@ -51,7 +51,7 @@ double Density(double given, double usual, std::span<const ImuSample> samples, C
   // spectral lines) the ratio is larger, and vibration averages out in the integration accordingly.
   const double white_share = std::min(1.0, 2 * SquaredThirdDifferences(samples, of, 2) / single);
   const double shown = std::sqrt(dt * single / (20 * 3));
-  return std::clamp(given, white_share * shown, std::max(kMostShare * shown, usual));
+  return std::clamp(given, white_share * shown, std::max(kMaxShare * shown, usual));
 }
 
 // Largest mean square change, per axis, between samples that are at most `gap_us` apart, or next to
@@ -92,8 +92,8 @@ ImuNoise WithUnseenMotion(const ImuNoise& given, int64_t gap_us,
 }
 
 ImuNoise WithUsualWalks(ImuNoise given) {
-  given.gyro_random_walk = std::clamp(given.gyro_random_walk, kLeastGyroWalk, kMostGyroWalk);
-  given.accel_random_walk = std::clamp(given.accel_random_walk, kLeastAccelWalk, kMostAccelWalk);
+  given.gyro_random_walk = std::clamp(given.gyro_random_walk, kMinGyroWalk, kMaxGyroWalk);
+  given.accel_random_walk = std::clamp(given.accel_random_walk, kMinAccelWalk, kMaxAccelWalk);
   return given;
 }
 

@@ -11,7 +11,7 @@
 #include "vio/imu/stationary_detector.h"
 #include "vio/initialization/initialiser.h"
 #include "vio/keyframes/frame_choice.h"
-#include "vio/keyframes/keyframe_publisher.h"
+#include "vio/keyframes/keyframe_edges.h"
 #include "vio/keyframes/track_history.h"
 #include "vio/window/image_stamps.h"
 #include "vio/window/landmark_check.h"
@@ -123,7 +123,7 @@ struct Estimator::Impl {
   ImageStamps stamps;
   double excess_interval_s = 0;  // of the newest image
   FrameChoice choice;
-  KeyframePublisher publisher;
+  KeyframeEdges keyframe_edges;
   int64_t last_tracked = 0;  // utime of the newest tracked image
   bool lost = false;
 };
@@ -226,7 +226,7 @@ std::vector<int32_t> Estimator::Impl::Solve(int max_iterations) {
   if (AllowForUnmodelledAcceleration(&problem)) {
     Optimise(problem, max_iterations);
   }
-  publisher.NoteContradicted(problem);
+  keyframe_edges.NoteContradicted(problem);
   std::vector<int32_t> outliers;
   const int newest = problem.state.Newest();
   RowViews rows(problem.state);
@@ -262,7 +262,7 @@ void Estimator::Impl::PublishUpTo(int newest, std::vector<FinishedKeyframe>* fin
   if (!due.empty()) {
     const MatrixXd P = WindowCovariance(problem, rows);
     for (const int i : due) {
-      finished->push_back(publisher.Publish(problem.state, P, history, imu_samples, i));
+      finished->push_back(keyframe_edges.Finish(problem.state, P, history, imu_samples, i));
     }
   }
 }
@@ -280,7 +280,7 @@ void Estimator::Impl::ShrinkWindow(std::vector<FinishedKeyframe>* finished) {
       break;
     }
     PublishUpTo(oldest, finished);
-    const int64_t published = publisher.last_utime().value_or(0);
+    const int64_t published = keyframe_edges.last_utime().value_or(0);
     Marginalisation what;
     what.keep_pose = state.frames[oldest].utime == published;
     what.drop_kept_pose = state.frames.front().utime != published;
@@ -289,7 +289,8 @@ void Estimator::Impl::ShrinkWindow(std::vector<FinishedKeyframe>* finished) {
     MarginaliseOldest(problem, what);
   }
   landmarks.Forget(history);
-  const int published = state.Find(publisher.last_utime().value_or(0)).value_or(state.Newest());
+  const int published =
+      state.Find(keyframe_edges.last_utime().value_or(0)).value_or(state.Newest());
   imu_samples.Forget(std::min(state.frames.front().imu_utime, ImuTime(state.frames[published])));
 }
 

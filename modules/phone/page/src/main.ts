@@ -3,7 +3,7 @@
 import "./style.css";
 import { agentColour, colours } from "../../../web/page/palette";
 import { byId } from "./dom";
-import { People } from "./people";
+import { AgentNames } from "./agent_names";
 import { filesOf, filesOfDrop, filesOfZip } from "./recording/files";
 import type { Recorder } from "./recording/recorder";
 import { saveRecording } from "./recording/save";
@@ -15,10 +15,10 @@ import { Stage } from "./view/stage";
 import { Visit } from "./visit";
 
 const options = new URLSearchParams(location.hash.slice(1));
-const people = new People();
+const agentNames = new AgentNames();
 const colourOf = (owner: number) => (owner > 0 ? agentColour(owner) : colours().anchor);
 const picture = byId<HTMLCanvasElement>("picture");
-const stage = new Stage(picture, byId<HTMLCanvasElement>("overlay"), byId("labels"), (agent) => people.nameOf(agent), colourOf);
+const stage = new Stage(picture, byId<HTMLCanvasElement>("overlay"), byId("labels"), (agent) => agentNames.nameOf(agent), colourOf);
 const welcome = new Welcome();
 const self = () => welcome.membership?.agent ?? 0;
 const visit = new Visit(
@@ -27,7 +27,7 @@ const visit = new Visit(
   { onEnter, onLeave, onPose: (pose) => panels.drawMap(pose), onRecorded, onNotice: notice },
   { ownOdometry: options.get("odometry") === "own", realTime: options.get("rate") !== "max" },
 );
-const panels = new Panels(visit, people, self, colourOf);
+const panels = new Panels(visit, agentNames, self, colourOf);
 
 function onEnter() {
   welcome.hide();
@@ -67,7 +67,7 @@ byId("record").onclick = () => {
   panels.showRecording();
 };
 picture.addEventListener("click", ({ clientX, clientY }) => {
-  const ownerName = (owner: number) => (owner === self() ? undefined : people.nameOf(owner));
+  const ownerName = (owner: number) => (owner === self() ? undefined : agentNames.nameOf(owner));
   void onTap(clientX, clientY, () => visit.walk, stage, ownerName);
 });
 

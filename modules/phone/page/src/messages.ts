@@ -1,6 +1,6 @@
 // The messages between the page and the worker that runs the agent. Times are microseconds.
 
-import type { AgentCamera, AgentPose, AnchorEdit, Others, Pose7, ProcessStatus, ShownAnchor } from "./agent/phone_agent";
+import type { AgentCamera, PhonePose, NewAnchor, Others, Pose7, ProcessStatus, DrawnAnchor } from "./agent/phone_agent";
 import type { ImuSample } from "./recording/euroc";
 
 // The phone's identity at the server, which it got by joining.
@@ -24,7 +24,7 @@ export type ToWorker =
   | OpenAgent
   | { kind: "imu"; samples: Float64Array } // kImuStride values per sample: utime, gyro xyz, accel xyz
   | { kind: "image"; utime: number; luma: Uint8Array; width: number; height: number; stride: number; T_odom_body?: Pose7 | null }
-  | { kind: "place"; edit: AnchorEdit }
+  | { kind: "place"; edit: NewAnchor }
   | { kind: "remove"; id: string }
   | { kind: "end_map" } // finishes the keyframes in the window; the next image opens a new map
   | { kind: "close" }; // ends the map; keyframes that the server does not have are stored for the next time
@@ -44,9 +44,9 @@ export type FromWorker =
   | { kind: "opened" }
   | { kind: "failed"; text: string } // the agent cannot be opened, or is broken
   | { kind: "taken"; utime: number } // the agent is done with the image
-  | { kind: "pose"; pose: AgentPose }
+  | { kind: "pose"; pose: PhonePose }
   | { kind: "camera"; camera: AgentCamera }
-  | { kind: "anchors"; anchors: ShownAnchor[] }
+  | { kind: "anchors"; anchors: DrawnAnchor[] }
   | { kind: "others"; told: Others }
   | { kind: "status"; vio?: ProcessStatus; uplink?: ProcessStatus; link?: LinkState }
   | { kind: "placed"; id: string }

@@ -1,6 +1,6 @@
 // One visit: first an unknown camera is calibrated; then an agent runs with the phone's sensors, the device's odometry or a recording.
 
-import type { AgentPose } from "./agent/phone_agent";
+import type { PhonePose } from "./agent/phone_agent";
 import { CalibrationWalk } from "./calibration/calibration_walk";
 import type { Membership } from "./messages";
 import { isCalibrated, openRecording, withCamera } from "./recording/euroc";
@@ -23,7 +23,7 @@ const kNotKept = "This browser does not keep the calibration.";
 export interface VisitEvents {
   onEnter(): void; // from now on a camera image is shown
   onLeave(): void;
-  onPose(pose: AgentPose): void;
+  onPose(pose: PhonePose): void;
   onRecorded(recorder: Recorder): void; // a recording has ended and is to be saved
   onNotice(text: string): void;
 }

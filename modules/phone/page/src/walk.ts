@@ -1,7 +1,7 @@
 // One walk of an agent: its sensors, live or played, its worker, and its newest state, which the page draws.
 
 import { AgentClient } from "./agent_client";
-import type { AgentPose, ProcessStatus, ShownAnchor } from "./agent/phone_agent";
+import type { PhonePose, ProcessStatus, DrawnAnchor } from "./agent/phone_agent";
 import type { FromWorker, LinkState, Membership } from "./messages";
 import type { CalibratedRecording, ImuSample } from "./recording/euroc";
 import { Player } from "./recording/player";
@@ -10,7 +10,7 @@ import { Recorder } from "./recording/recorder";
 import { kPhoneImu } from "./sensors/calibration";
 import type { Camera, CameraImage } from "./sensors/camera";
 import { brightnessOf } from "./sensors/luma";
-import { OtherPeople } from "./other_people";
+import { OtherAgents } from "./other_agents";
 import { Motion } from "./sensors/motion";
 import { NewestFrame } from "./sensors/newest_frame";
 import { parseCamera } from "./view/camera_model";
@@ -20,15 +20,15 @@ import type { Stage } from "./view/stage";
 import type { XrFrame, XrImage, XrOdometry } from "./xr/xr_odometry";
 
 export interface WalkEvents {
-  onPose(pose: AgentPose): void;
+  onPose(pose: PhonePose): void;
   onNotice(text: string): void;
   onFailure(text: string): void;
 }
 
 export class Walk {
-  pose?: AgentPose;
-  anchors: ShownAnchor[] = [];
-  readonly others = new OtherPeople();
+  pose?: PhonePose;
+  anchors: DrawnAnchor[] = [];
+  readonly others = new OtherAgents();
   link?: LinkState;
   vio?: ProcessStatus;
   uplink?: ProcessStatus;
@@ -161,7 +161,7 @@ export class Walk {
   // Draws the things over a camera image that the device shows itself, with the pose of this frame. Taps use the agent's newest image.
   private showThrough({ T_odom_body, target }: XrFrame) {
     if (!this.pose) return;
-    const pose: AgentPose = { ...this.pose, T_odom_body };
+    const pose: PhonePose = { ...this.pose, T_odom_body };
     this.stage.showThrough(this.camera, pose, this.anchors, this.others.in(pose.map, performance.now()), target);
   }
 

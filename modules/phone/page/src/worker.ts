@@ -1,7 +1,7 @@
 // Runs the agent in a Web Worker: odometry, uplink, the WebSocket to the gateway, and the store of keyframes that wait for the server.
 
 import { PhoneAgent } from "./agent/phone_agent";
-import type { AgentEvents, AnchorEdit, WasmModuleFactory } from "./agent/phone_agent";
+import type { PhoneEvents, NewAnchor, WasmModuleFactory } from "./agent/phone_agent";
 import { SpoolStore } from "./agent/spool_store";
 import { GatewayLink, gatewayOrigin } from "./link/gateway_link";
 import { kImuStride } from "./messages";
@@ -105,7 +105,7 @@ class AgentHost {
     say({ kind: "taken", utime });
   }
 
-  private place(edit: AnchorEdit) {
+  private place(edit: NewAnchor) {
     try {
       say({ kind: "placed", id: this.agent.placeAnchor(edit) });
     } catch (error) {
@@ -113,7 +113,7 @@ class AgentHost {
     }
   }
 
-  private take(events: AgentEvents) {
+  private take(events: PhoneEvents) {
     for (const packet of events.linkUp) this.link?.send(packet);
     if (this.spool && events.spool.length > 0) {
       this.stored = this.spool.apply(events.spool).catch(storageFailed);

@@ -4,8 +4,8 @@
 //
 // Frames: p_a = T_a_b * p_b; `body` is the IMU, `odom` has z up. Times are microseconds.
 
-import type { CalibrationConfig, CalibrationOutcome, CalibrationProgress } from '../calibration/camera_calibration';
-import { packRows } from '../sensors/luma';
+import type { CalibrationConfig, CalibrationOutcome, CalibrationProgress } from "../calibration/camera_calibration";
+import { packRows } from "../sensors/luma";
 
 /** x, y, z in metres, then the quaternion qx, qy, qz, qw. */
 export type Pose7 = [number, number, number, number, number, number, number];
@@ -28,7 +28,7 @@ interface AgentConfig {
   openedUtime: number;
 }
 
-export interface AgentPose {
+export interface PhonePose {
   /** Time of the image, sensor clock. */
   utime: number;
   state: 'initialising' | 'tracking' | 'lost';
@@ -64,7 +64,7 @@ export interface ProcessStatus {
   counters: Record<string, number>;
 }
 
-export interface ShownAnchor {
+export interface DrawnAnchor {
   /** "agent/createdUtime". */
   id: string;
   name: string;
@@ -98,17 +98,17 @@ export interface SpoolChange {
 }
 
 /** The agent's output since the last call that returned events. */
-export interface AgentEvents {
+export interface PhoneEvents {
   /** Sealed packets for the gateway's WebSocket; each is one binary message. */
   linkUp: Uint8Array[];
   /** The newest pose; absent if no image was processed. */
-  pose?: AgentPose;
+  pose?: PhonePose;
   /** The camera as the odometry has refined it. Comes with each new keyframe. */
   camera?: AgentCamera;
   /** Comes once per second. */
   status?: { vio?: ProcessStatus; uplink?: ProcessStatus };
   /** All anchors that are shown; absent if nothing changed. Comes 20 times per second while one moves, else once per second. */
-  anchors?: ShownAnchor[];
+  anchors?: DrawnAnchor[];
   /** Comes five times per second while there are any; absent in between. An agent that is not in it for two seconds is away. */
   others?: Others;
   /** Changes of the stored keyframes, to be applied in this order. */
@@ -117,7 +117,7 @@ export interface AgentEvents {
   keyframes: Uint8Array[];
 }
 
-export interface AnchorEdit {
+export interface NewAnchor {
   /** At most 50 bytes. */
   name: string;
   /** At most 1000 bytes. */
@@ -138,12 +138,12 @@ interface NativeAgent {
   addPosedImage(utime: number, width: number, height: number, T_odom_body: Pose7 | null): void;
   onLinkDown(packet: Uint8Array): void;
   restore(id: string, bytes: Uint8Array): void;
-  placeAnchor(edit: AnchorEdit): string;
+  placeAnchor(edit: NewAnchor): string;
   removeAnchor(id: string): void;
   poll(nowUs: number): void;
   startAnew(): void;
   flush(): void;
-  take(): AgentEvents;
+  take(): PhoneEvents;
   delete(): void;
 }
 
@@ -189,7 +189,7 @@ export class PhoneAgent {
    * Adds a grey image of the calibration's size, with `stride` bytes per row. It is processed when there are samples beyond its time: in
    * this call, or in a later addImu; the next call that returns events then has the results.
    */
-  addImage(utime: number, luma: Uint8Array, width: number, height: number, stride: number): AgentEvents {
+  addImage(utime: number, luma: Uint8Array, width: number, height: number, stride: number): PhoneEvents {
     const buffer = this.native.imageBuffer(width * height);
     packRows(luma, width, height, stride, buffer);
     this.native.addImage(utime, width, height);
@@ -197,7 +197,7 @@ export class PhoneAgent {
   }
 
   /** With `devicePoses`: adds an image with the device's pose, z up; null if the device's odometry is lost. */
-  addPosedImage(utime: number, luma: Uint8Array, width: number, height: number, stride: number, T_odom_body: Pose7 | null): AgentEvents {
+  addPosedImage(utime: number, luma: Uint8Array, width: number, height: number, stride: number, T_odom_body: Pose7 | null): PhoneEvents {
     packRows(luma, width, height, stride, this.native.imageBuffer(width * height));
     this.native.addPosedImage(utime, width, height, T_odom_body);
     return this.native.take();
@@ -216,7 +216,7 @@ export class PhoneAgent {
   }
 
   /** Returns the new anchor's id. Throws if the agent did not track that image or a field is out of bounds. */
-  placeAnchor(edit: AnchorEdit): string {
+  placeAnchor(edit: NewAnchor): string {
     const id = this.native.placeAnchor(edit);
     if (id.startsWith('error: ')) {
       throw new Error(id.slice('error: '.length));
@@ -229,7 +229,7 @@ export class PhoneAgent {
   }
 
   /** Call it every 10 to 20 ms. `nowUs`: µs since 1970 without steps, 1000 * (performance.timeOrigin + performance.now()). */
-  poll(nowUs: number): AgentEvents {
+  poll(nowUs: number): PhoneEvents {
     this.native.poll(nowUs);
     return this.native.take();
   }
@@ -240,7 +240,7 @@ export class PhoneAgent {
   }
 
   /** No more images come: finishes the keyframes in the window. */
-  flush(): AgentEvents {
+  flush(): PhoneEvents {
     this.native.flush();
     return this.native.take();
   }

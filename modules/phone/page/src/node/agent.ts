@@ -9,7 +9,7 @@ import { webcrypto } from "node:crypto";
 import WebSocket from "ws";
 
 import { PhoneAgent } from "../agent/phone_agent";
-import type { AgentEvents, WasmModuleFactory } from "../agent/phone_agent";
+import type { PhoneEvents, WasmModuleFactory } from "../agent/phone_agent";
 import { GatewayLink } from "../link/gateway_link";
 import { isCalibrated, openRecording, withCamera } from "../recording/euroc";
 import type { CalibratedRecording, Recording } from "../recording/euroc";
@@ -89,7 +89,7 @@ class Session {
     }
   }
 
-  private take(events: AgentEvents) {
+  private take(events: PhoneEvents) {
     for (const packet of events.linkUp) this.link?.send(packet);
     for (const keyframe of events.keyframes) this.keyframeLog?.write(keyframe);
     this.keyframes += events.keyframes.length;

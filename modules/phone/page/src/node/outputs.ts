@@ -2,7 +2,7 @@
 
 import { closeSync, openSync, writeSync } from "node:fs";
 
-import type { AgentPose } from "../agent/phone_agent";
+import type { PhonePose } from "../agent/phone_agent";
 
 const kLogMagic = 0xeda1da01;
 const kUtimeOffset = 24; // of utime in keyframe_t and keyframe_2_t: after the fingerprint and the id
@@ -15,7 +15,7 @@ export class TumFiles {
   constructor(private readonly path: string) {}
 
   // Writes a tracked pose. Each map has its own file.
-  write({ utime, map, T_odom_body }: AgentPose) {
+  write({ utime, map, T_odom_body }: PhonePose) {
     if (map !== this.map) {
       this.close();
       this.map = map;

@@ -1,10 +1,10 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import type { AgentPose } from "../agent/phone_agent";
+import type { PhonePose } from "../agent/phone_agent";
 import { calibrationHint, hintOf } from "./hints";
 import type { Situation } from "./hints";
 
-const pose: AgentPose = {
+const pose: PhonePose = {
   utime: 1, state: "tracking", reason: "", map: "2/5", T_odom_body: [0, 0, 0, 0, 0, 0, 1], fused: false, numTracked: 100,
 };
 const good: Situation = { pose, brightness: 120, link: "open", together: [], motionSilent: false };

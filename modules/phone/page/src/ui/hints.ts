@@ -1,12 +1,12 @@
 // The one line that tells the visitor what to do next.
 
-import type { AgentPose } from "../agent/phone_agent";
+import type { PhonePose } from "../agent/phone_agent";
 import type { CalibrationProgress } from "../calibration/camera_calibration";
 import type { CalibrationWalk } from "../calibration/calibration_walk";
 import type { LinkState } from "../messages";
 
 export interface Situation {
-  pose?: AgentPose; // the newest one
+  pose?: PhonePose; // the newest one
   brightness: number; // of the newest image, 0 to 255
   link?: LinkState; // undefined: the agent runs without a server
   together: string[]; // names of the people whose map is fused with this one

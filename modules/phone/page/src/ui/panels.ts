@@ -1,8 +1,8 @@
 // The panels over the camera's image: the hint, the calibration's ring, tracking quality and numbers, the small map.
 
-import type { AgentPose } from "../agent/phone_agent";
+import type { PhonePose } from "../agent/phone_agent";
 import { byId } from "../dom";
-import type { People } from "../people";
+import type { AgentNames } from "../agent_names";
 import type { Visit } from "../visit";
 import { calibrationHint, hintOf } from "./hints";
 import type { Hint } from "./hints";
@@ -19,7 +19,7 @@ export class Panels {
   // `self`: this phone's agent, 0 without one.
   constructor(
     private readonly visit: Visit,
-    private readonly people: People,
+    private readonly agentNames: AgentNames,
     private readonly self: () => number,
     private readonly colourOf: (owner: number) => string,
   ) {
@@ -56,7 +56,7 @@ export class Panels {
     byId("record").classList.toggle("recording", isRecording);
   }
 
-  drawMap(pose: AgentPose) {
+  drawMap(pose: PhonePose) {
     const walk = this.visit.walk!;
     const others = walk.others.in(pose.map, performance.now());
     this.map.draw(pose, walk.camera.T_body_cam, walk.anchors, others, this.colourOf, this.self() || 1);
@@ -100,6 +100,6 @@ export class Panels {
     const agents = new Set([...present, ...owner, ...anchors.map((anchor) => anchor.owner)]);
     agents.delete(0);
     agents.delete(this.self());
-    return [...agents].map((agent) => this.people.nameOf(agent));
+    return [...agents].map((agent) => this.agentNames.nameOf(agent));
   }
 }

@@ -1,7 +1,7 @@
 // A map of the path from above, with the anchors and the others. It is in the odom frame, so that nothing jumps.
 
 import { Matrix4, Vector3 } from "three";
-import type { AgentPose, OtherAgent, ShownAnchor } from "../agent/phone_agent";
+import type { PhonePose, OtherAgent, DrawnAnchor } from "../agent/phone_agent";
 import { matrixOf } from "../view/poses";
 
 const kStep_m = 0.1; // distance between points of the path that are kept
@@ -18,7 +18,7 @@ export class SmallMap {
 
   // `T_body_cam` gives the direction of the camera.
   draw(
-    pose: AgentPose, T_body_cam: Matrix4, anchors: ShownAnchor[], others: OtherAgent[], colourOf: (owner: number) => string, self: number,
+    pose: PhonePose, T_body_cam: Matrix4, anchors: DrawnAnchor[], others: OtherAgent[], colourOf: (owner: number) => string, self: number,
   ) {
     this.add(pose);
     const things = [...anchors.map(({ T_odom_anchor }) => T_odom_anchor), ...others.map(({ T_odom_cam }) => T_odom_cam)];
@@ -44,7 +44,7 @@ export class SmallMap {
     }
   }
 
-  private add({ map, state, T_odom_body: [x, y] }: AgentPose) {
+  private add({ map, state, T_odom_body: [x, y] }: PhonePose) {
     if (map !== this.map) this.way = [];
     this.map = map;
     const last = this.way.at(-1);

@@ -1,14 +1,14 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { Vector3 } from "three";
-import type { AgentPose, Pose7 } from "../agent/phone_agent";
+import type { PhonePose, Pose7 } from "../agent/phone_agent";
 import { roughCalibration } from "../sensors/calibration";
 import { CameraMotion } from "./camera_motion";
 import { parseCamera } from "./camera_model";
 import { thingsBefore } from "./overlay";
 
 const camera = parseCamera(roughCalibration({ label: "", width: 640, height: 480, angle_deg: 90 }), "rough");
-const poseAt = (utime: number, T_odom_body: Pose7, map = "1/1"): AgentPose =>
+const poseAt = (utime: number, T_odom_body: Pose7, map = "1/1"): PhonePose =>
   ({ utime, state: "tracking", reason: "", map, fused: false, numTracked: 100, T_odom_body });
 
 // The camera frame is the body's in this test, so that directions are easy to tell.

@@ -2,7 +2,7 @@
 // rotates at 1 rad/s, the last row of a phone's camera sees things 10 pixels from there.
 
 import { Matrix4, Quaternion, Vector3 } from "three";
-import type { AgentPose } from "../agent/phone_agent";
+import type { PhonePose } from "../agent/phone_agent";
 import type { CameraModel } from "./camera_model";
 import { matrixOf } from "./poses";
 
@@ -13,7 +13,7 @@ export class CameraMotion {
   private constructor(private readonly rotation_radps: Vector3, private readonly velocity_mps: Vector3) {} // in the camera frame
 
   // From the poses of two images in succession; undefined if they tell none.
-  static between(before: AgentPose | undefined, now: AgentPose, { T_body_cam }: CameraModel): CameraMotion | undefined {
+  static between(before: PhonePose | undefined, now: PhonePose, { T_body_cam }: CameraModel): CameraMotion | undefined {
     const duration_us = now.utime - (before?.utime ?? now.utime);
     if (!before || before.map !== now.map || before.state !== "tracking" || duration_us <= 0 || duration_us > kLongest_us) return undefined;
     const T_odom_before = matrixOf(before.T_odom_body).multiply(T_body_cam);

@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import type { AgentPose, Pose7 } from "../agent/phone_agent";
+import type { PhonePose, Pose7 } from "../agent/phone_agent";
 import { roughCalibration } from "../sensors/calibration";
 import { parseCamera } from "./camera_model";
 import { thingsBefore } from "./overlay";
@@ -9,7 +9,7 @@ import type { Thing } from "./overlay";
 const camera = parseCamera(roughCalibration({ label: "", width: 480, height: 640, angle_deg: 0 }), "rough");
 const half = Math.SQRT1_2;
 // The phone is held upright at (1, 2, 1.5) and its back camera looks along odom's +y: the body's y is up, its z is -y.
-const pose: AgentPose = {
+const pose: PhonePose = {
   utime: 1, state: "tracking", reason: "", map: "1/1", fused: false, numTracked: 100,
   T_odom_body: [1, 2, 1.5, half, 0, 0, half],
 };

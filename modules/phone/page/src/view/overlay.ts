@@ -6,7 +6,7 @@ import {
   WebGLRenderer,
 } from "three";
 import type { WebGLRenderTarget } from "three";
-import type { AgentPose, Pose7 } from "../agent/phone_agent";
+import type { PhonePose, Pose7 } from "../agent/phone_agent";
 import { kAnchorFaces } from "./anchor_shape";
 import { project } from "./camera_model";
 import type { CameraModel } from "./camera_model";
@@ -41,7 +41,7 @@ interface Seen extends DrawnThing {
 
 // The things whose origin is in front of the camera, nearest first, also those outside the image. Each is where the row that sees its
 // origin sees it, if the motion is known.
-export function thingsBefore(camera: CameraModel, pose: AgentPose, things: Thing[], motion?: CameraMotion): Seen[] {
+export function thingsBefore(camera: CameraModel, pose: PhonePose, things: Thing[], motion?: CameraMotion): Seen[] {
   const T_cam_odom = matrixOf(pose.T_odom_body).multiply(camera.T_body_cam).invert();
   const seen = things.flatMap(({ T_odom_thing, ...thing }) => {
     const T_cam_thing = T_cam_odom.clone().multiply(matrixOf(T_odom_thing));

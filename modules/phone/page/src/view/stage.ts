@@ -2,7 +2,7 @@
 // not move in it. It is then a tenth of a second late at most, which nobody notices without looking past the phone.
 
 import type { WebGLRenderTarget } from "three";
-import type { AgentPose, OtherAgent, ShownAnchor } from "../agent/phone_agent";
+import type { PhonePose, OtherAgent, DrawnAnchor } from "../agent/phone_agent";
 import type { CameraModel } from "./camera_model";
 import { CameraMotion } from "./camera_motion";
 import { Fit } from "./fit";
@@ -20,7 +20,7 @@ export interface Drawn {
 export class Stage {
   drawn?: Drawn;
   private readonly waiting = new Map<number, ImageBitmap>();
-  private before?: AgentPose;
+  private before?: PhonePose;
   readonly overlay: Overlay;
 
   constructor(
@@ -43,19 +43,19 @@ export class Stage {
   }
 
   // Shows the picture of the pose, if it is still there.
-  show(camera: CameraModel, pose: AgentPose, anchors: ShownAnchor[], others: OtherAgent[]) {
+  show(camera: CameraModel, pose: PhonePose, anchors: DrawnAnchor[], others: OtherAgent[]) {
     const motion = CameraMotion.between(this.before, pose, camera);
     this.before = pose;
     if (this.present(pose.utime)) this.draw(camera, pose, anchors, others, { motion });
   }
 
   // For a device that shows its camera's image itself: draws only the things, into `target`.
-  showThrough(camera: CameraModel, pose: AgentPose, anchors: ShownAnchor[], others: OtherAgent[], target: WebGLRenderTarget) {
+  showThrough(camera: CameraModel, pose: PhonePose, anchors: DrawnAnchor[], others: OtherAgent[], target: WebGLRenderTarget) {
     this.draw(camera, pose, anchors, others, { target });
   }
 
   private draw(
-    camera: CameraModel, pose: AgentPose, anchors: ShownAnchor[], others: OtherAgent[],
+    camera: CameraModel, pose: PhonePose, anchors: DrawnAnchor[], others: OtherAgent[],
     { motion, target }: { motion?: CameraMotion; target?: WebGLRenderTarget },
   ) {
     const things = [

@@ -13,7 +13,7 @@ interface Known {
   told_ms: number;
 }
 
-export class OtherPeople {
+export class OtherAgents {
   private map = "";
   private readonly known = new Map<number, Known>();
 

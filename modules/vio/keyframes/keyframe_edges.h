@@ -15,11 +15,11 @@
 
 namespace pangea::vio {
 
-class KeyframePublisher {
+class KeyframeEdges {
  public:
   // Publishes frame `index` of the window, whose covariance is P.
-  FinishedKeyframe Publish(WindowState& state, const Eigen::MatrixXd& P,
-                           const TrackHistory& history, const ImuBuffer& imu, int index);
+  FinishedKeyframe Finish(WindowState& state, const Eigen::MatrixXd& P, const TrackHistory& history,
+                          const ImuBuffer& imu, int index);
   // Records the contradicted IMU factors; a keyframe whose span contains one gets no
   // preintegration.
   void NoteContradicted(const WindowProblem& problem);

@@ -1,4 +1,4 @@
-#include "core/submap_store.h"
+#include "core/keyframe_store.h"
 
 #include <gtest/gtest.h>
 
@@ -36,8 +36,8 @@ Keyframe MakeKeyframe(int32_t seq) {
   return keyframe;
 }
 
-TEST(SubmapStore, ViewUndistortsAndFindsLandmarks) {
-  SubmapStore store;
+TEST(KeyframeStore, ViewUndistortsAndFindsLandmarks) {
+  KeyframeStore store;
   store.Add(MakeKeyframe(0));
   const auto view = store.Find({kMap, 0});
   ASSERT_NE(view, nullptr);
@@ -49,8 +49,8 @@ TEST(SubmapStore, ViewUndistortsAndFindsLandmarks) {
   EXPECT_EQ(store.Find({kMap, 1}), nullptr);
 }
 
-TEST(SubmapStore, WindowBehindEndsWhereAKeyframeIsMissing) {
-  SubmapStore store;
+TEST(KeyframeStore, WindowBehindEndsWhereAKeyframeIsMissing) {
+  KeyframeStore store;
   for (const int32_t seq : {0, 1, 2, 4, 5}) {
     store.Add(MakeKeyframe(seq));
   }
@@ -62,8 +62,8 @@ TEST(SubmapStore, WindowBehindEndsWhereAKeyframeIsMissing) {
   EXPECT_TRUE(store.WindowBehind({kMap, 5}, 4).empty());
 }
 
-TEST(SubmapStore, WindowFollowsTheEdges) {
-  SubmapStore store;
+TEST(KeyframeStore, WindowFollowsTheEdges) {
+  KeyframeStore store;
   store.Add(MakeKeyframe(3));
   store.Add(MakeKeyframe(1));
   EXPECT_FALSE(store.ChainIsComplete({kMap, 1}, {kMap, 3}));
@@ -80,8 +80,8 @@ TEST(SubmapStore, WindowFollowsTheEdges) {
   EXPECT_NEAR(*store.PathBetween({kMap, 1}, {kMap, 3}), 4.0, 1e-12);
 }
 
-TEST(SubmapStore, ABridgedGapIsNoGap) {
-  SubmapStore store;
+TEST(KeyframeStore, ABridgedGapIsNoGap) {
+  KeyframeStore store;
   store.Add(MakeKeyframe(0));
   Keyframe bridged = MakeKeyframe(5);
   bridged.edge->from_seq = 0;
@@ -92,8 +92,8 @@ TEST(SubmapStore, ABridgedGapIsNoGap) {
   EXPECT_FALSE(store.PathBetween({kMap, 3}, {kMap, 5}));
 }
 
-TEST(SubmapStore, GoesOnAfterWhatWasLost) {
-  SubmapStore store;
+TEST(KeyframeStore, GoesOnAfterWhatWasLost) {
+  KeyframeStore store;
   for (const int seq : {0, 1, 4, 5}) {
     Keyframe keyframe = MakeKeyframe(seq);
     keyframe.T_odom_body.t = {2.0 * seq, 0, 0};
@@ -111,7 +111,7 @@ TEST(SubmapStore, GoesOnAfterWhatWasLost) {
 }
 
 // The answers of a store about a map with gaps. They must not depend on the order of the queries.
-std::vector<std::vector<uint8_t>> Answers(SubmapStore store) {
+std::vector<std::vector<uint8_t>> Answers(KeyframeStore store) {
   for (int seq = 0; seq < 60; ++seq) {
     if (seq % 20 != 13) {
       store.Add(MakeKeyframe(seq));
@@ -129,19 +129,20 @@ std::vector<std::vector<uint8_t>> Answers(SubmapStore store) {
   return answers;
 }
 
-TEST(SubmapStore, SaysTheSameWhateverLiesWhere) {
-  const auto expected = Answers(SubmapStore({.max_views = 10000}));
+TEST(KeyframeStore, SaysTheSameWhateverLiesWhere) {
+  const auto expected = Answers(KeyframeStore({.max_views = 10000}));
   EXPECT_GT(expected.size(), 30u);
-  EXPECT_EQ(Answers(SubmapStore({.max_views = 1})), expected);
-  EXPECT_EQ(Answers(SubmapStore({.max_views = 10}, std::make_shared<test::TestRecordStore>(10000))),
-            expected);
-  EXPECT_EQ(Answers(SubmapStore({.max_views = 10}, std::make_shared<test::TestRecordStore>(20))),
+  EXPECT_EQ(Answers(KeyframeStore({.max_views = 1})), expected);
+  EXPECT_EQ(
+      Answers(KeyframeStore({.max_views = 10}, std::make_shared<test::TestRecordStore>(10000))),
+      expected);
+  EXPECT_EQ(Answers(KeyframeStore({.max_views = 10}, std::make_shared<test::TestRecordStore>(20))),
             expected);
 }
 
-TEST(SubmapStore, WhatFindsNoRoomStaysInMemoryAndIsBoundedThere) {
-  SubmapStore store({.max_in_memory = 3, .max_views = 2},
-                    std::make_shared<test::TestRecordStore>(2));
+TEST(KeyframeStore, WhatFindsNoRoomStaysInMemoryAndIsBoundedThere) {
+  KeyframeStore store({.max_in_memory = 3, .max_views = 2},
+                      std::make_shared<test::TestRecordStore>(2));
   for (int seq = 0; seq < 7; ++seq) {
     store.Add(MakeKeyframe(seq));
     EXPECT_NE(store.Find({kMap, seq}), nullptr);
@@ -157,8 +158,8 @@ TEST(SubmapStore, WhatFindsNoRoomStaysInMemoryAndIsBoundedThere) {
 }
 
 // Nobody waits for what the store itself has dropped: it will not come again.
-TEST(SubmapStore, WhatWasDroppedIsLost) {
-  SubmapStore store({.max_in_memory = 3});
+TEST(KeyframeStore, WhatWasDroppedIsLost) {
+  KeyframeStore store({.max_in_memory = 3});
   for (int seq = 0; seq < 7; ++seq) {
     store.Add(MakeKeyframe(seq));
   }
@@ -171,9 +172,9 @@ TEST(SubmapStore, WhatWasDroppedIsLost) {
   EXPECT_FALSE(store.WindowIsComplete({kMap, 7}, 5)) << "that one may still come";
 }
 
-TEST(SubmapStore, WhatCannotBeReadIsNotThere) {
+TEST(KeyframeStore, WhatCannotBeReadIsNotThere) {
   const auto records = std::make_shared<test::TestRecordStore>(100);
-  SubmapStore store({.max_views = 1}, records);
+  KeyframeStore store({.max_views = 1}, records);
   store.Add(MakeKeyframe(0));
   store.Add(MakeKeyframe(1));
   records->broken = true;
@@ -184,9 +185,9 @@ TEST(SubmapStore, WhatCannotBeReadIsNotThere) {
   EXPECT_EQ(store.WindowUpTo({kMap, 1}, 2).size(), 2u);
 }
 
-TEST(SubmapStore, RestoresAllOfItsBytesOrNothing) {
+TEST(KeyframeStore, RestoresAllOfItsBytesOrNothing) {
   const auto records = std::make_shared<test::TestRecordStore>(100);
-  SubmapStore store({}, records);
+  KeyframeStore store({}, records);
   store.Add(MakeKeyframe(0));
   store.Add(MakeKeyframe(1));
   ByteRecordWriter writer;
@@ -195,7 +196,7 @@ TEST(SubmapStore, RestoresAllOfItsBytesOrNothing) {
   for (const int off : {-1, 1}) {
     std::vector<uint8_t> wrong = bytes;
     wrong.resize(bytes.size() + off);
-    SubmapStore unchanged({}, records);
+    KeyframeStore unchanged({}, records);
     unchanged.Add(MakeKeyframe(7));
     ByteRecordReader reader(wrong);
     EXPECT_FALSE(unchanged.Restore(&reader)) << off;
@@ -206,15 +207,15 @@ TEST(SubmapStore, RestoresAllOfItsBytesOrNothing) {
   std::vector<uint8_t> nowhere = bytes;
   std::fill_n(nowhere.begin() + 20, sizeof(int64_t), 0xff);
   ByteRecordReader of_nowhere(nowhere);
-  EXPECT_FALSE(SubmapStore({}, records).Restore(&of_nowhere));
-  SubmapStore restored({}, records);
+  EXPECT_FALSE(KeyframeStore({}, records).Restore(&of_nowhere));
+  KeyframeStore restored({}, records);
   ByteRecordReader reader(bytes);
   ASSERT_TRUE(restored.Restore(&reader));
   EXPECT_EQ(restored.WindowUpTo({kMap, 1}, 2).size(), 2u);
 }
 
-TEST(SubmapStore, IsBounded) {
-  SubmapStore store({.max_in_memory = 3, .max_views = 2});
+TEST(KeyframeStore, IsBounded) {
+  KeyframeStore store({.max_in_memory = 3, .max_views = 2});
   for (int seq = 0; seq < 5; ++seq) {
     store.Add(MakeKeyframe(seq));
     EXPECT_NE(store.Find({kMap, seq}), nullptr);

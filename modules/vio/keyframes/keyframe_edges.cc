@@ -1,4 +1,4 @@
-#include "vio/keyframes/keyframe_publisher.h"
+#include "vio/keyframes/keyframe_edges.h"
 
 #include <cmath>
 
@@ -15,9 +15,9 @@ int64_t TakenAt(const WindowState& state, const WindowFrame& frame) {
 
 }  // namespace
 
-FinishedKeyframe KeyframePublisher::Publish(WindowState& state, const Eigen::MatrixXd& P,
-                                            const TrackHistory& history, const ImuBuffer& imu,
-                                            int index) {
+FinishedKeyframe KeyframeEdges::Finish(WindowState& state, const Eigen::MatrixXd& P,
+                                       const TrackHistory& history, const ImuBuffer& imu,
+                                       int index) {
   FinishedKeyframe keyframe = FinishKeyframe(state, P, history, index);
   const int at = state.FirstRow(index);
   const auto from = last_ ? state.Find(last_->utime) : std::nullopt;
@@ -44,7 +44,7 @@ FinishedKeyframe KeyframePublisher::Publish(WindowState& state, const Eigen::Mat
   return keyframe;
 }
 
-void KeyframePublisher::NoteContradicted(const WindowProblem& problem) {
+void KeyframeEdges::NoteContradicted(const WindowProblem& problem) {
   for (int to = 1; to <= problem.state.Newest(); ++to) {
     if (problem.imu_factors[to] && problem.imu_factors[to]->contradicted) {
       contradicted_utimes_.insert(problem.state.frames[to].utime);
@@ -52,11 +52,11 @@ void KeyframePublisher::NoteContradicted(const WindowProblem& problem) {
   }
 }
 
-std::optional<int64_t> KeyframePublisher::last_utime() const {
+std::optional<int64_t> KeyframeEdges::last_utime() const {
   return last_ ? std::optional(last_->utime) : std::nullopt;
 }
 
-bool KeyframePublisher::ContradictedWithin(int64_t after_utime, int64_t to_utime) const {
+bool KeyframeEdges::ContradictedWithin(int64_t after_utime, int64_t to_utime) const {
   const auto first = contradicted_utimes_.upper_bound(after_utime);
   return first != contradicted_utimes_.end() && *first <= to_utime;
 }

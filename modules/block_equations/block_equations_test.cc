@@ -1,4 +1,4 @@
-#include "least_squares/block_equations.h"
+#include "block_equations/block_equations.h"
 
 #include <gtest/gtest.h>
 

@@ -61,21 +61,21 @@ class KeyframeView {
 // Keyframes of one map in ascending seq, each joined to the one before it by its odometry edge.
 using KeyframeWindow = std::vector<std::shared_ptr<const KeyframeView>>;
 
-struct SubmapStoreOptions {
+struct KeyframeStoreOptions {
   int max_in_memory = 20000;         // about 30 kB each
   int max_views = 256;               // about 65 kB each
   bool keep_preintegration = false;  // place matching does not need it
 };
 
-class SubmapStore {
+class KeyframeStore {
  public:
   // Without a RecordStore all records stay in memory.
-  explicit SubmapStore(SubmapStoreOptions options = {},
-                       std::shared_ptr<RecordStore> records = nullptr)
+  explicit KeyframeStore(KeyframeStoreOptions options = {},
+                         std::shared_ptr<RecordStore> records = nullptr)
       : options_(options), records_(std::move(records)), views_(options.max_views) {}
 
   // The bytes that the store keeps of a keyframe in its RecordStore.
-  static std::vector<uint8_t> RecordOf(Keyframe keyframe, const SubmapStoreOptions& options);
+  static std::vector<uint8_t> RecordOf(Keyframe keyframe, const KeyframeStoreOptions& options);
 
   // A keyframe that is already there stays as it is.
   void Add(Keyframe keyframe);
@@ -124,7 +124,7 @@ class SubmapStore {
 
   void DropOne();
 
-  SubmapStoreOptions options_;
+  KeyframeStoreOptions options_;
   std::shared_ptr<RecordStore> records_;
   std::map<KeyframeId, Stored> keyframes_;
   std::map<KeyframeId, int32_t> lost_;  // last keyframe of a lost run -> first seq of the run

@@ -2,7 +2,7 @@
 
 const kRefresh_ms = 10_000;
 
-export class People {
+export class AgentNames {
   private readonly names = new Map<number, string>();
 
   constructor() {

@@ -1,4 +1,4 @@
-#include "core/submap_store.h"
+#include "core/keyframe_store.h"
 
 #include <algorithm>
 #include <cmath>
@@ -48,14 +48,15 @@ std::vector<int> KeyframeView::CornersOfLandmark(int32_t landmark_id) const {
   return corners;
 }
 
-std::vector<uint8_t> SubmapStore::RecordOf(Keyframe keyframe, const SubmapStoreOptions& options) {
+std::vector<uint8_t> KeyframeStore::RecordOf(Keyframe keyframe,
+                                             const KeyframeStoreOptions& options) {
   if (!options.keep_preintegration) {
     keyframe.preintegration.reset();
   }
   return ToRecord(keyframe);
 }
 
-void SubmapStore::Save(ByteWriter* writer) const {
+void KeyframeStore::Save(ByteWriter* writer) const {
   writer->PutCount(keyframes_.size());
   for (const auto& [id, stored] : keyframes_) {
     writer->Put(id);
@@ -68,10 +69,10 @@ void SubmapStore::Save(ByteWriter* writer) const {
   }
 }
 
-bool SubmapStore::Restore(ByteReader* reader) {
-  constexpr size_t kLeastBytes = 60;
+bool KeyframeStore::Restore(ByteReader* reader) {
+  constexpr size_t kMinBytes = 60;
   std::map<KeyframeId, Stored> keyframes;
-  for (size_t left = reader->GetCount(kLeastBytes); left > 0; --left) {
+  for (size_t left = reader->GetCount(kMinBytes); left > 0; --left) {
     KeyframeId id;
     int64_t offset = 0;
     uint32_t size = 0;
@@ -100,7 +101,7 @@ bool SubmapStore::Restore(ByteReader* reader) {
   return true;
 }
 
-void SubmapStore::Add(Keyframe keyframe) {
+void KeyframeStore::Add(Keyframe keyframe) {
   const KeyframeId id = keyframe.id;
   if (keyframes_.contains(id)) {
     return;
@@ -120,7 +121,7 @@ void SubmapStore::Add(Keyframe keyframe) {
   }
 }
 
-void SubmapStore::DropOne() {
+void KeyframeStore::DropOne() {
   const KeyframeId id = in_memory_.front();
   views_.Erase(id);
   keyframes_.erase(id);
@@ -132,7 +133,7 @@ void SubmapStore::DropOne() {
   ++counters_.dropped;
 }
 
-std::shared_ptr<const KeyframeView> SubmapStore::Find(const KeyframeId& id) {
+std::shared_ptr<const KeyframeView> KeyframeStore::Find(const KeyframeId& id) {
   if (auto view = views_.Find(id)) {
     return view;
   }
@@ -152,7 +153,7 @@ std::shared_ptr<const KeyframeView> SubmapStore::Find(const KeyframeId& id) {
   return view;
 }
 
-KeyframeWindow SubmapStore::WindowUpTo(const KeyframeId& id, int count) {
+KeyframeWindow KeyframeStore::WindowUpTo(const KeyframeId& id, int count) {
   KeyframeWindow window;
   KeyframeId next = id;
   while (static_cast<int>(window.size()) < count) {
@@ -170,7 +171,7 @@ KeyframeWindow SubmapStore::WindowUpTo(const KeyframeId& id, int count) {
   return window;
 }
 
-KeyframeWindow SubmapStore::WindowBehind(const KeyframeId& id, int count) {
+KeyframeWindow KeyframeStore::WindowBehind(const KeyframeId& id, int count) {
   KeyframeWindow window;
   for (KeyframeId next = id; static_cast<int>(window.size()) < count;) {
     const int32_t before = next.seq++;
@@ -183,11 +184,11 @@ KeyframeWindow SubmapStore::WindowBehind(const KeyframeId& id, int count) {
   return window;
 }
 
-void SubmapStore::NoteLost(const MapId& map, int32_t from_seq, int32_t to_seq) {
+void KeyframeStore::NoteLost(const MapId& map, int32_t from_seq, int32_t to_seq) {
   lost_[{map, to_seq}] = from_seq;
 }
 
-std::optional<int32_t> SubmapStore::LostSince(const KeyframeId& id) const {
+std::optional<int32_t> KeyframeStore::LostSince(const KeyframeId& id) const {
   const auto it = lost_.lower_bound(id);
   if (it != lost_.end() && it->first.map == id.map && it->second <= id.seq) {
     return it->second;
@@ -195,7 +196,7 @@ std::optional<int32_t> SubmapStore::LostSince(const KeyframeId& id) const {
   return std::nullopt;
 }
 
-bool SubmapStore::WindowIsComplete(const KeyframeId& id, int count) const {
+bool KeyframeStore::WindowIsComplete(const KeyframeId& id, int count) const {
   KeyframeId next = id;
   for (int i = 0; i < count; ++i) {
     const auto it = keyframes_.find(next);
@@ -210,7 +211,7 @@ bool SubmapStore::WindowIsComplete(const KeyframeId& id, int count) const {
   return true;
 }
 
-bool SubmapStore::ChainIsComplete(const KeyframeId& older, const KeyframeId& newer) const {
+bool KeyframeStore::ChainIsComplete(const KeyframeId& older, const KeyframeId& newer) const {
   KeyframeId next = newer;
   while (next.seq > older.seq) {
     const auto it = keyframes_.find(next);
@@ -228,8 +229,8 @@ bool SubmapStore::ChainIsComplete(const KeyframeId& older, const KeyframeId& new
   return true;
 }
 
-std::optional<double> SubmapStore::PathBetween(const KeyframeId& older,
-                                               const KeyframeId& newer) const {
+std::optional<double> KeyframeStore::PathBetween(const KeyframeId& older,
+                                                 const KeyframeId& newer) const {
   double path_m = 0;
   KeyframeId next = newer;
   const Stored* after_gap = nullptr;
