@@ -11,6 +11,7 @@
 #include "log_file/log_reader.h"
 #include "log_file/log_writer.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "pangea/constraint_t.hpp"
 #include "pangea/place_match_t.hpp"
 #include "programs.h"

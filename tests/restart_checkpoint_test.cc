@@ -24,6 +24,7 @@
 #include "log_file/log_writer.h"
 #include "map_points/map_points_process.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "place_recognition/place_recognition_process.h"
 #include "posegraph/posegraph_process.h"

@@ -5,6 +5,7 @@
 
 #include "link/wire.h"
 #include "log_file/log_writer.h"
+#include "messages/encoding.h"
 #include "programs.h"
 #include "recording/trajectory.h"
 #include "replay/keyframe_log.h"

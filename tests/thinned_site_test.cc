@@ -23,8 +23,8 @@
 #include "pangea/keyframe_t.hpp"
 #include "pangea/resend_request_t.hpp"
 #include "pangea/status_t.hpp"
+#include "processes/child_process.h"
 #include "programs.h"
-#include "session/processes/child_process.h"
 #include "site/compact.h"
 #include "site/site_test_world.h"
 
@@ -32,8 +32,6 @@ namespace pangea::tests {
 namespace {
 
 namespace fs = std::filesystem;
-using session::ChildProcess;
-
 constexpr int32_t kAgent = 2;
 constexpr int kNumVisits = 4;  // of the second walk, in the journal
 constexpr int32_t kSeq = 15;   // of the keyframe at which the anchor is placed

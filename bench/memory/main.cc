@@ -18,11 +18,11 @@
 
 #include "anchors/anchors.h"
 #include "bench/process_use.h"
-#include "bus/bus.h"
 #include "files/scratch_file.h"
 #include "fusion/fusion.h"
 #include "global_ba/global_ba.h"
 #include "map_points/map_points.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "place_recognition/place_recognition.h"
 #include "posegraph/posegraph.h"

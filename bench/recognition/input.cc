@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "bus/bus.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "recording/euroc.h"
 #include "replay/keyframe_log.h"

@@ -16,6 +16,7 @@
 #include "core/descriptor.h"
 #include "log_file/log_reader.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "site/journal_writer.h"
 

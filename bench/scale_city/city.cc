@@ -11,6 +11,7 @@
 #include "bench/visits/visit.h"
 #include "log_file/log_reader.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "posegraph/posegraph.h"
 

@@ -17,6 +17,7 @@
 #include "bus/process.h"
 #include "eval/metrics.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "site/journal_writer.h"
 

@@ -11,6 +11,7 @@
 #include "external_odometry/external_odometry_process.h"
 #include "log_file/log_writer.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "recording/euroc.h"
 #include "recording/trajectory.h"

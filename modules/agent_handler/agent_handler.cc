@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "bus/parse_message.h"
 #include "link/compression.h"
+#include "messages/encoding.h"
 
 namespace pangea {
 namespace {

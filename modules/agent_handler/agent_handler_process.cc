@@ -9,6 +9,7 @@
 
 #include "bus/status_log.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "pangea/pose_t.hpp"
 

@@ -14,6 +14,7 @@
 #include "agent_handler/link_test_world.h"
 #include "link/agent_key.h"
 #include "log_file/log_writer.h"
+#include "messages/encoding.h"
 #include "messages/testing/test_keyframes.h"
 #include "pangea/again_t.hpp"
 #include "pangea/have_t.hpp"

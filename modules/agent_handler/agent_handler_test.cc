@@ -7,6 +7,7 @@
 #include "agent_handler/journal/outstanding_results.h"
 #include "agent_handler/journal/resend_queue.h"
 #include "link/compression.h"
+#include "messages/encoding.h"
 #include "messages/testing/test_keyframes.h"
 
 namespace pangea {

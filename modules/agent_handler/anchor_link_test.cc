@@ -7,6 +7,7 @@
 #include <random>
 
 #include "agent_handler/anchor_link_test_world.h"
+#include "messages/encoding.h"
 
 namespace pangea {
 namespace {

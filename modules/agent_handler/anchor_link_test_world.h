@@ -15,6 +15,7 @@
 
 #include "agent_handler/link_test_world.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/testing/test_anchors.h"
 #include "pangea/again_t.hpp"
 #include "pangea/resend_request_t.hpp"

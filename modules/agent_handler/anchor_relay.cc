@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "messages/channels.h"
+#include "messages/encoding.h"
 
 namespace pangea {
 namespace {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "messages/encoding.h"
 #include "messages/testing/test_anchors.h"
 
 namespace pangea {

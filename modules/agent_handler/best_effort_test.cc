@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "agent_handler/link_test_world.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 
 namespace pangea {

@@ -17,6 +17,7 @@
 #include "agent_handler/link_test_world.h"
 #include "link/agent_key.h"
 #include "link/anchor_wire.h"
+#include "messages/encoding.h"
 #include "messages/testing/test_anchors.h"
 #include "messages/testing/test_keyframes.h"
 #include "pangea/again_t.hpp"

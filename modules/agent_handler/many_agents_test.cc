@@ -10,6 +10,7 @@
 #include "agent_handler/link_test_world.h"
 #include "link/agent_key.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/testing/test_keyframes.h"
 #include "pangea/status_t.hpp"
 

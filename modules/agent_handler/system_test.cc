@@ -17,6 +17,7 @@
 #include "core/testing/program.h"
 #include "link/agent_key.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/testing/test_keyframes.h"
 #include "pangea/again_t.hpp"
 #include "pangea/have_t.hpp"

@@ -7,6 +7,7 @@
 #include "core/testing/synthetic_world.h"
 #include "messages/anchor_messages.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "pangea/again_t.hpp"
 #include "pangea/resend_request_t.hpp"
 #include "pangea/status_t.hpp"

@@ -8,13 +8,13 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <span>
 #include <string>
 #include <vector>
 
-namespace pangea {
+#include "core/bytes.h"
+#include "messages/encoding.h"
 
-using Bytes = std::span<const uint8_t>;
+namespace pangea {
 
 class Bus {
  public:
@@ -105,30 +105,9 @@ class LcmBus : public Bus {
   int handled_since_work_ = 0;
 };
 
-// Encodes an lcm-gen type.
-template <typename Message>
-std::vector<uint8_t> EncodeMessage(const Message& message) {
-  std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
-  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  return bytes;
-}
-
 template <typename Message>
 void PublishMessage(Bus& bus, const std::string& channel, const Message& message) {
   bus.Publish(channel, EncodeMessage(message));
-}
-
-// Decodes an lcm-gen type. False on a wrong fingerprint, a payload that is too short or too long,
-// or absurd counts. (LCM's own typed subscriptions would abort the process.)
-template <typename Message>
-bool DecodeMessage(Bytes data, Message* message) {
-  try {
-    *message = Message{};
-    return message->decode(data.data(), 0, static_cast<int>(data.size())) ==
-           static_cast<int>(data.size());
-  } catch (const std::exception&) {
-    return false;
-  }
 }
 
 }  // namespace pangea

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "messages/encoding.h"
 #include "pangea/options_t.hpp"
 
 namespace pangea {

@@ -15,6 +15,7 @@
 #include "core/server_messages.h"
 #include "messages/catch_up_messages.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "messages/testing/test_keyframes.h"
 

@@ -10,6 +10,7 @@
 #include "bus/retransmission/missing.h"
 #include "core/server_messages.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 
 namespace pangea {

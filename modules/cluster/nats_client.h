@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "bus/bus.h"
 #include "cluster/nats_access.h"
+#include "core/bytes.h"
 
 namespace pangea {
 

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-#include "bus/parse_message.h"
 #include "core/candidates/candidate_order.h"
 #include "core/server_messages.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 
 namespace pangea {

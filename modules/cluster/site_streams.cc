@@ -7,8 +7,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "bus/parse_message.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 
 namespace pangea {

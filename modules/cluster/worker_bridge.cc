@@ -5,10 +5,10 @@
 #include <functional>
 #include <utility>
 
-#include "bus/parse_message.h"
 #include "bus/retransmission/missing.h"
 #include "core/server_messages.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 
 namespace pangea {

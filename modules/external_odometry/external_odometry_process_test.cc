@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/testing/test_cameras.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "pangea/pose_t.hpp"
 

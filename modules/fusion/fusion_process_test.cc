@@ -5,6 +5,7 @@
 #include "inter_map_ba/inter_map_ba_process.h"
 #include "loop_verification/loop_verification_test_world.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "pangea/resend_request_t.hpp"
 #include "pangea/status_t.hpp"

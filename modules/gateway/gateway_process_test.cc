@@ -8,6 +8,7 @@
 #include "agent_handler/agent_handler_process.h"
 #include "files/text_file.h"
 #include "gateway/test_gateway_process.h"
+#include "messages/encoding.h"
 #include "messages/testing/test_keyframes.h"
 #include "pangea/have_t.hpp"
 #include "uplink/uplink_process.h"

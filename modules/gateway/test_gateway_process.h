@@ -17,6 +17,7 @@
 #include "bus/process.h"
 #include "gateway/gateway_process.h"
 #include "gateway/test_client.h"
+#include "messages/encoding.h"
 #include "pangea/status_t.hpp"
 
 namespace pangea {

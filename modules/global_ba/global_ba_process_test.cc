@@ -4,6 +4,7 @@
 
 #include "global_ba/ba_test_world.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "pangea/resend_request_t.hpp"
 #include "pangea/status_t.hpp"

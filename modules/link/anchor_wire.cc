@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "link/bytes_io.h"
+#include "messages/encoding.h"
 #include "messages/messages_checks.h"
 
 namespace pangea {

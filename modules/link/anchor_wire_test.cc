@@ -5,6 +5,7 @@
 #include <limits>
 #include <random>
 
+#include "messages/encoding.h"
 #include "messages/testing/test_anchors.h"
 
 namespace pangea {

@@ -12,7 +12,7 @@
 #include <string_view>
 #include <vector>
 
-#include "bus/bus.h"
+#include "core/bytes.h"
 
 namespace pangea {
 

@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "bus/bus.h"
+#include "core/bytes.h"
 
 namespace pangea {
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "bus/bus.h"
+#include "core/bytes.h"
 #include "core/ids.h"
 
 namespace pangea {

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "link/bytes_io.h"
+#include "messages/encoding.h"
 #include "messages/messages_checks.h"
 
 namespace pangea {

@@ -25,8 +25,8 @@
 #include <string>
 #include <vector>
 
-#include "bus/bus.h"
 #include "bus/transport/udpm_assembler.h"
+#include "core/bytes.h"
 #include "link/link_session.h"
 #include "messages/messages.h"
 #include "pangea/pose_t.hpp"

@@ -21,7 +21,7 @@
 #include <utility>
 #include <vector>
 
-#include "bus/bus.h"
+#include "core/bytes.h"
 #include "link_emulator/link_conditions.h"
 
 namespace pangea {

@@ -8,6 +8,7 @@
 
 #include "link_emulator/link_emulator_process.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 
 namespace pangea {
 namespace {

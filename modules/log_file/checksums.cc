@@ -7,6 +7,7 @@
 #include "core/big_endian.h"
 #include "log_file/log_event.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "pangea/checksums_t.hpp"
 
 namespace pangea {

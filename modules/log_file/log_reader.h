@@ -8,7 +8,7 @@
 #include <optional>
 #include <string>
 
-#include "bus/bus.h"
+#include "core/bytes.h"
 #include "log_file/checked_scan.h"
 #include "log_file/log_reading.h"
 

@@ -15,7 +15,7 @@
 #include <string>
 #include <vector>
 
-#include "bus/bus.h"
+#include "core/bytes.h"
 #include "log_file/log_event.h"
 
 namespace pangea {

@@ -9,12 +9,12 @@
 #include <optional>
 #include <stdexcept>
 
-#include "bus/parse_message.h"
 #include "core/median.h"
 #include "fusion/fusion.h"
 #include "inter_map_ba/inter_map_ba.h"
 #include "log_file/log_reader.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "server_options/server_options.h"
 

@@ -9,11 +9,11 @@
 #include <vector>
 
 #include "anchors/anchor_registry.h"
-#include "bus/parse_message.h"
 #include "log_file/log_event.h"
 #include "log_file/log_reader.h"
 #include "messages/anchor_messages.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 
 namespace pangea {
 namespace {

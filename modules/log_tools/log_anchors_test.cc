@@ -15,6 +15,7 @@
 #include "log_tools/log_anchors.h"
 #include "log_tools/log_export.h"
 #include "messages/anchor_messages.h"
+#include "messages/encoding.h"
 
 namespace pangea {
 namespace {

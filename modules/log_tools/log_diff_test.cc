@@ -6,6 +6,7 @@
 
 #include <filesystem>
 
+#include "messages/encoding.h"
 #include "pangea/correction_t.hpp"
 #include "pangea/status_t.hpp"
 

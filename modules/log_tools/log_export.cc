@@ -6,10 +6,10 @@
 #include <map>
 #include <stdexcept>
 
-#include "bus/parse_message.h"
 #include "files/text_file.h"
 #include "log_file/log_reader.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "report/metrics/report_metrics.h"
 #include "report/report_pictures.h"

@@ -11,6 +11,7 @@
 #include "log_tools/log_edit.h"
 #include "log_tools/log_export.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "messages/messages_checks.h"
 #include "report/metrics/report_groups.h"

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "log_file/log_reader.h"
+#include "messages/encoding.h"
 #include "pangea/place_match_t.hpp"
 
 namespace pangea {

@@ -256,14 +256,14 @@ struct Described {
   int stride = 3;
   int64_t bytes = 4'000'000'000;
   double sigma_m = 0.1;
-  bool equalize = true;
+  bool equalise = true;
 
   template <typename Archive>
   void Visit(Archive& archive) {
     archive.Add("stride", &stride, {1, 1000}, "", "every so many");
     archive.Add("bytes", &bytes, {1e6, 1e15}, "B", "");
     archive.Add("sigma_m", &sigma_m, {0.001, 10}, "m", "");
-    archive.Add("equalize", &equalize, "the image first");
+    archive.Add("equalise", &equalise, "the image first");
   }
 };
 
@@ -285,9 +285,9 @@ TEST(YamlOptions, BoundsUnitAndHelpStandBesideTheValues) {
             "  stride: 3  # 1 to 1000: every so many\n"
             "  bytes: 4000000000  # 1000000 to 1000000000000000 B\n"
             "  sigma_m: 0.1  # 0.001 to 10 m\n"
-            "  equalize: true  # the image first\n");
+            "  equalise: true  # the image first\n");
   EXPECT_EQ(yaml.PrintWithoutHelp(),
-            "check:\n  stride: 3\n  bytes: 4000000000\n  sigma_m: 0.1\n  equalize: true\n");
+            "check:\n  stride: 3\n  bytes: 4000000000\n  sigma_m: 0.1\n  equalise: true\n");
   const std::string printed = yaml.Print();
   yaml.ReadText(printed, "printed");
   EXPECT_EQ(yaml.Print(), printed);
@@ -322,10 +322,10 @@ TEST(YamlOptions, WhatAnotherVersionKnewIsLeftOutAndSaid) {
   Outer outer;
   YamlOptions yaml;
   outer.Visit(yaml);
-  const std::string text = "check: {stride: 5, fate: 2, equalize: false}\nold: {a: 1}\n";
+  const std::string text = "check: {stride: 5, fate: 2, equalise: false}\nold: {a: 1}\n";
   EXPECT_THAT(yaml.ReadKnown(text, "old.lcm"), testing::ElementsAre("check.fate 2", "old"));
   EXPECT_EQ(outer.check.stride, 5);
-  EXPECT_FALSE(outer.check.equalize);
+  EXPECT_FALSE(outer.check.equalise);
   EXPECT_THROW(yaml.ReadText(text, "mine.yaml"), std::runtime_error);
   EXPECT_THROW(yaml.ReadKnown("check: {stride: 0}", "old.lcm"), std::runtime_error);
 }

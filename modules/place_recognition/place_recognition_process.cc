@@ -9,6 +9,7 @@
 #include "bus/record_status.h"
 #include "messages/catch_up_messages.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 
 namespace pangea {

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "pangea/status_t.hpp"
 #include "place_recognition/test_world.h"

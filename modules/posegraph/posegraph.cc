@@ -78,10 +78,10 @@ bool PoseGraph::SolveIsDue(const GraphGroup& group, bool from_the_beginning) con
 
 void PoseGraph::SolveOnce(GraphGroup* group, bool from_the_beginning) {
   const bool whole = from_the_beginning && WholeIsDue(*group);
-  if (!whole && group->solve.regrouped && Optimizer().JoinsALargePart(*group)) {
-    Optimizer().SolveJoined(group);
+  if (!whole && group->solve.regrouped && Optimiser().JoinsALargePart(*group)) {
+    Optimiser().SolveJoined(group);
   } else {
-    Optimizer().Solve(group, whole);
+    Optimiser().Solve(group, whole);
   }
   ++num_solves_;
 }
@@ -102,10 +102,10 @@ void PoseGraph::SolveRestored() {
   bool undone = false;
   for (auto& [oldest, group] : groups_.by_oldest()) {
     if (group.solve.NewMapsWait()) {
-      if (Optimizer().HasJoined(group)) {
-        Optimizer().SolveJoined(&group);
+      if (Optimiser().HasJoined(group)) {
+        Optimiser().SolveJoined(&group);
       } else {
-        Optimizer().Solve(&group, false);
+        Optimiser().Solve(&group, false);
       }
       ++num_solves_;
       undone |= UndoMerges(group);

@@ -12,7 +12,7 @@
 //   graph/         maps (nodes, odometry), loops, constraints whose keyframes are not here yet
 //   grouping/      pairs of maps and their merges; groups, when to solve and publish them;
 //                  initial placement of a group's maps
-//   optimization/  how a group is solved, its least-squares problem, its factor on odometry drift
+//   optimisation/  how a group is solved, its least-squares problem, its factor on odometry drift
 //   solver/        poses of four degrees of freedom, robust least squares
 //   publication/   refinements, and the published state of a group
 //
@@ -30,7 +30,7 @@
 #include "posegraph/graph/received_constraints.h"
 #include "posegraph/grouping/graph_groups.h"
 #include "posegraph/grouping/map_pairs.h"
-#include "posegraph/optimization/group_optimizer.h"
+#include "posegraph/optimisation/group_optimiser.h"
 #include "posegraph/posegraph_options.h"
 #include "posegraph/publication/group_publisher.h"
 
@@ -94,7 +94,7 @@ class PoseGraph {
   int NumberOf(const MapId& map);
   // False if one of its keyframes is unknown.
   bool UseConstraint(const Constraint& constraint);
-  GroupOptimizer Optimizer() { return {options_, pairs_, &maps_, &loops_}; }
+  GroupOptimiser Optimiser() { return {options_, pairs_, &maps_, &loops_}; }
   bool WholeIsDue(const GraphGroup& group) const;
   bool SolveIsDue(const GraphGroup& group, bool from_the_beginning) const;
   void SolveOnce(GraphGroup* group, bool from_the_beginning);

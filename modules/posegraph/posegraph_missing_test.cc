@@ -1,5 +1,6 @@
 #include <limits>
 
+#include "messages/encoding.h"
 #include "posegraph/test_server.h"
 
 // Missing messages: requested, waited for, or given up.

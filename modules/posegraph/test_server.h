@@ -8,6 +8,7 @@
 
 #include "core/testing/synthetic_world.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "pangea/correction_t.hpp"
 #include "pangea/map_state_t.hpp"

@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "log_file/log_writer.h"
+#include "messages/encoding.h"
 #include "messages/keyframe_message.h"
 
 namespace pangea {

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "pangea/again_t.hpp"
 

@@ -5,9 +5,9 @@
 #include <set>
 #include <utility>
 
-#include "bus/bus.h"
 #include "log_file/log_reader.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 
 namespace pangea {

@@ -9,6 +9,7 @@
 #include "log_file/log_reader.h"
 #include "log_file/log_writer.h"
 #include "messages/anchor_messages.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "replay/keyframe_log.h"
 

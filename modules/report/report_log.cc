@@ -5,11 +5,11 @@
 #include <set>
 
 #include "bus/node.h"
-#include "bus/parse_message.h"
 #include "core/keyframe.h"
 #include "log_file/log_reader.h"
 #include "messages/anchor_messages.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "messages/state_chunks.h"
 #include "pangea/correction_t.hpp"

@@ -15,6 +15,7 @@
 #include "core/rigid3.h"
 #include "core/server_messages.h"
 #include "log_file/log_writer.h"
+#include "messages/encoding.h"
 #include "recording/trajectory.h"
 #include "report/report.h"
 

@@ -8,6 +8,7 @@
 
 #include "log_file/log_reader.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "options/yaml_options.h"
 

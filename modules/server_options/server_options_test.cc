@@ -9,6 +9,7 @@
 
 #include "log_file/log_writer.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "options/yaml_options.h"
 #include "pangea/options_t.hpp"
 

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "bus/bus.h"
+#include "core/bytes.h"
 
 namespace pangea::site {
 

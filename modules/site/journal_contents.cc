@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include "bus/parse_message.h"
 #include "log_file/checksums.h"
 #include "messages/anchor_messages.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 
 namespace pangea::site {

@@ -12,6 +12,7 @@
 #include "log_file/log_reader.h"
 #include "messages/anchor_messages.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "site/journal_contents.h"
 #include "site/journal_writer.h"

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "site/site_test_world.h"
 

@@ -14,6 +14,7 @@
 #include "log_file/log_reader.h"
 #include "messages/anchor_messages.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "pangea/options_t.hpp"
 

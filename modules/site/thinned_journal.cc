@@ -6,11 +6,11 @@
 #include <utility>
 #include <vector>
 
-#include "bus/parse_message.h"
 #include "bus/process.h"
 #include "files/scratch_file.h"
 #include "messages/anchor_messages.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "server_options/server_options.h"
 

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "replay/keyframe_log.h"
 #include "site/compact.h"

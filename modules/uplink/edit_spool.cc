@@ -15,6 +15,7 @@
 #include "log_file/log_event.h"
 #include "messages/anchor_messages.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 
 namespace pangea {
 namespace {

@@ -8,7 +8,7 @@
 #include <fstream>
 #include <map>
 
-#include "bus/bus.h"
+#include "messages/encoding.h"
 #include "messages/testing/test_anchors.h"
 
 namespace pangea {

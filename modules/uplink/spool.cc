@@ -17,6 +17,7 @@
 #include "log_file/damaged_copy.h"
 #include "log_file/log_event.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 
 namespace pangea {

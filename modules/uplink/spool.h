@@ -23,7 +23,7 @@
 #include <string>
 #include <vector>
 
-#include "bus/bus.h"
+#include "core/bytes.h"
 #include "core/ids.h"
 #include "log_file/checked_scan.h"
 

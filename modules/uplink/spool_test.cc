@@ -10,6 +10,7 @@
 #include <lcm/lcm-cpp.hpp>
 #include <random>
 
+#include "messages/encoding.h"
 #include "messages/testing/test_keyframes.h"
 #include "uplink/thin.h"
 

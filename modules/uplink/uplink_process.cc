@@ -8,6 +8,7 @@
 
 #include "link/compression.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "pangea/again_t.hpp"
 #include "pangea/have_t.hpp"
 #include "pangea/others_t.hpp"

@@ -12,10 +12,10 @@
 #include <string>
 #include <vector>
 
-#include "bus/bus.h"
 #include "log_file/log_writer.h"
 #include "messages/anchor_messages.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "pangea/pose_t.hpp"
 #include "pangea/status_t.hpp"

@@ -6,6 +6,7 @@
 #include "log_file/log_writer.h"
 #include "messages/anchor_messages.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "viewer/log_show.h"
 #include "viewer/viewer_process.h"
 #include "viewer/viewer_test_world.h"

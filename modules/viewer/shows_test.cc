@@ -9,6 +9,7 @@
 #include "log_file/log_reader.h"
 #include "log_file/log_writer.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "pangea/again_t.hpp"
 #include "pangea/have_t.hpp"

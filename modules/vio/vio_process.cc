@@ -11,6 +11,7 @@
 #include <system_error>
 
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "pangea/pose_t.hpp"
 #include "recording/tum.h"
@@ -122,7 +123,7 @@ void VioProcess::Handle(const VioOutput& output) {
     node_.Count("lost");
   }
   FollowMaps(output);
-  Localize(output);
+  Localise(output);
   PublishPose(output);
   for (const Keyframe& keyframe : output.keyframes) {
     PublishKeyframe(keyframe);
@@ -145,16 +146,16 @@ void VioProcess::FollowMaps(const VioOutput& output) {
 
 // Looks for landmarks of the map in a new keyframe. Without landmarks the window's covariance is
 // not computed.
-void VioProcess::Localize(const VioOutput& output) {
+void VioProcess::Localise(const VioOutput& output) {
   if (!output.is_keyframe || !localization_.HasLandmarks()) {
     return;
   }
   const Vio::View view = vio_->NewestKeyframe(output);
   localization_.AddKeyframe(view.camera, view.corners, view.window);
   shown_.Sharpen(*localization_.T_map_odom());
-  const MapLocalization::Counters& counters = localization_.counters();
-  node_.Set("keyframes_localized", counters.localized);
-  node_.Set("keyframes_not_localized", counters.not_localized);
+  const MapLocalisation::Counters& counters = localization_.counters();
+  node_.Set("keyframes_localised", counters.localised);
+  node_.Set("keyframes_not_localised", counters.not_localised);
   node_.Set("landmarks_seen", counters.seen);
 }
 

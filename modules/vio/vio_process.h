@@ -20,7 +20,7 @@
 #include "bus/process.h"
 #include "bus/retransmission/reliable_keyframe_publisher.h"
 #include "log_file/log_writer.h"
-#include "vio/live/map_localization.h"
+#include "vio/live/map_localisation.h"
 #include "vio/live/shown_pose.h"
 #include "vio/vio.h"
 
@@ -94,7 +94,7 @@ class VioProcess : public Process {
   void OnCorrection(const Correction& correction);
   void OnLandmarks(const MapLandmarks& landmarks);
   void FollowMaps(const VioOutput& output);
-  void Localize(const VioOutput& output);
+  void Localise(const VioOutput& output);
   void Handle(const VioOutput& output);
   void PublishPose(const VioOutput& output);
   void PublishKeyframe(const Keyframe& keyframe);
@@ -110,7 +110,7 @@ class VioProcess : public Process {
   ReliableKeyframePublisher publisher_;
   std::optional<Vio> vio_;
   ShownPose shown_;
-  MapLocalization localization_;
+  MapLocalisation localization_;
   MapId shown_map_;
   OptionsAnnouncer announcer_;
   int64_t next_status_utime_ = 0;

@@ -8,6 +8,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "pangea/image_t.hpp"
 #include "pangea/imu_t.hpp"
 #include "vio/front_end/test_images.h"

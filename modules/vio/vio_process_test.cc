@@ -12,6 +12,7 @@
 
 #include "files/text_file.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/keyframe_message.h"
 #include "recording/trajectory.h"
 #include "vio/command_line.h"
@@ -222,7 +223,7 @@ TEST_F(VioProcessTest, LandmarksDoNotReachTheOdometry) {
   }
   EXPECT_EQ(Counter("landmark_messages"), 1);
   EXPECT_EQ(status_.num_refused, 1);
-  EXPECT_GT(Counter("keyframes_localized") + Counter("keyframes_not_localized"), 0);
+  EXPECT_GT(Counter("keyframes_localised") + Counter("keyframes_not_localised"), 0);
   EXPECT_EQ(published[0], published[1]);
 }
 

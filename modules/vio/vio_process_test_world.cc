@@ -4,6 +4,7 @@
 #include <random>
 
 #include "core/testing/test_cameras.h"
+#include "messages/encoding.h"
 #include "vio/front_end/test_images.h"
 
 namespace pangea::vio {

@@ -5,6 +5,7 @@
 
 #include "fuzz.h"
 #include "log_tools/message_fields.h"
+#include "messages/encoding.h"
 #include "pangea_schemas.h"
 
 namespace pangea::fuzz {

@@ -1,6 +1,7 @@
 // A keyframe, from bytes to the domain type.
 
 #include "fuzz.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "pangea/keyframe_2_t.hpp"
 

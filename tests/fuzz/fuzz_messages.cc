@@ -7,6 +7,7 @@
 #include "link/compression.h"
 #include "link/wire.h"
 #include "messages/catch_up_messages.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "messages/state_chunks.h"
 

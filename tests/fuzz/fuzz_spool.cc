@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "fuzz.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "uplink/spool.h"
 

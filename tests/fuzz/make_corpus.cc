@@ -21,6 +21,7 @@
 #include "link_channels.h"
 #include "log_file/log_reader.h"
 #include "messages/anchor_messages.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "pangea_schemas.h"
 #include "sensor_channels.h"

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <utility>
 
-#include "bus/parse_message.h"
 #include "bus/retransmission/missing.h"
 #include "messages/anchor_messages.h"
 #include "messages/catch_up_messages.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 
 namespace pangea {
 

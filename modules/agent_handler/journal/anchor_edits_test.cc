@@ -9,6 +9,7 @@
 
 #include "agent_handler/journal/archive.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/testing/test_anchors.h"
 #include "messages/testing/test_keyframes.h"
 #include "pangea/again_t.hpp"

@@ -8,11 +8,11 @@
 #include <iostream>
 #include <utility>
 
-#include "bus/parse_message.h"
 #include "bus/retransmission/missing.h"
 #include "messages/anchor_messages.h"
 #include "messages/catch_up_messages.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "pangea/have_t.hpp"
 #include "pangea/keyframe_2_t.hpp"

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "agent_handler/link_test_world.h"
+#include "messages/encoding.h"
 #include "messages/testing/test_keyframes.h"
 #include "pangea/have_t.hpp"
 #include "pangea/resend_request_t.hpp"

@@ -25,7 +25,7 @@
 
 #include "agent_handler/journal/journal_index.h"
 #include "agent_handler/journal/journal_mend.h"
-#include "bus/bus.h"
+#include "core/bytes.h"
 #include "log_file/checked_scan.h"
 
 namespace pangea {

@@ -16,6 +16,7 @@
 #include "agent_handler/journal/journal.h"
 #include "core/server_messages.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/testing/test_keyframes.h"
 
 namespace pangea {

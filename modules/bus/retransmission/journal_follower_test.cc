@@ -8,6 +8,7 @@
 
 #include "bus/retransmission/timeouts.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 
 namespace pangea {

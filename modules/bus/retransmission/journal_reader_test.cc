@@ -17,6 +17,7 @@
 #include "bus/retransmission/timeouts.h"
 #include "log_file/checksums.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 
 namespace pangea {
 namespace {

@@ -9,8 +9,8 @@
 #include <cstring>
 #include <stdexcept>
 
-#include "bus/parse_message.h"
 #include "log_file/log_event.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 
 namespace pangea {

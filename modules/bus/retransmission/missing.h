@@ -13,6 +13,7 @@
 #include "bus/retransmission/reorder_buffer.h"
 #include "messages/catch_up_messages.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "pangea/again_t.hpp"
 
 namespace pangea {

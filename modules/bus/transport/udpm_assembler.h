@@ -19,7 +19,7 @@
 #include <utility>
 #include <vector>
 
-#include "bus/bus.h"
+#include "core/bytes.h"
 
 namespace pangea {
 

@@ -6,6 +6,7 @@
 
 #include "core/testing/test_descriptors.h"
 #include "link/wire.h"
+#include "messages/encoding.h"
 
 namespace pangea {
 

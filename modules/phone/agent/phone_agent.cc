@@ -8,6 +8,7 @@
 
 #include "messages/anchor_messages.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/keyframe_message.h"
 #include "pangea/pose_t.hpp"
 

@@ -9,6 +9,7 @@
 
 #include "agent_handler/agent_handler_process.h"
 #include "link/agent_key.h"
+#include "messages/encoding.h"
 #include "messages/testing/test_anchors.h"
 #include "messages/testing/test_keyframes.h"
 

@@ -7,10 +7,10 @@
 #include <memory>
 #include <stdexcept>
 
-#include "bus/parse_message.h"
 #include "bus/process.h"
 #include "messages/anchor_messages.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/keyframe_message.h"
 #include "pangea/pose_t.hpp"
 #include "recording/euroc.h"

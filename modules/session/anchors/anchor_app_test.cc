@@ -15,6 +15,7 @@
 #include "core/keyframe.h"
 #include "messages/anchor_messages.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "pangea/pose_t.hpp"
 
 namespace pangea::session {

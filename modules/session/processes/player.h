@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "session/processes/child_process.h"
+#include "processes/child_process.h"
 #include "session/session_file/session_file.h"
 
 namespace pangea::session {

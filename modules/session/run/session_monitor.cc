@@ -6,9 +6,9 @@
 #include <set>
 
 #include "bus/node.h"
-#include "bus/parse_message.h"
 #include "bus/process.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "pangea/pose_t.hpp"
 

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "pangea/pose_t.hpp"
 

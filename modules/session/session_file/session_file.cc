@@ -10,6 +10,7 @@
 #include "core/anchor.h"
 #include "options/nearest_word.h"
 #include "options/yaml_options.h"
+#include "server/server_processes.h"
 
 namespace pangea::session {
 namespace {

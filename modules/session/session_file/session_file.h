@@ -89,11 +89,6 @@ struct SessionScript {
   Expectations expect;
 };
 
-// The server processes of a session; each is started once.
-inline constexpr const char* kServerProcesses[] = {
-    "agent_handler", "place_recognition", "inter_map_ba", "fusion",
-    "posegraph",     "global_ba",         "map_points",   "anchors"};
-
 // Reads and checks a session file, but not the recordings and logs it names. Throws
 // std::runtime_error with file, key and correction.
 SessionScript ParseSessionFile(const std::filesystem::path& file);

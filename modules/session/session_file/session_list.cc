@@ -8,7 +8,7 @@
 
 #include "files/text_file.h"
 #include "options/nearest_word.h"
-#include "session/processes/child_process.h"
+#include "processes/child_process.h"
 #include "session/session_file/session_file.h"
 
 namespace pangea::session {

@@ -4,6 +4,7 @@
 
 #include "messages/anchor_messages.h"
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "pangea/again_t.hpp"
 #include "pangea/pose_t.hpp"

@@ -8,7 +8,7 @@
 #include <string>
 #include <variant>
 
-#include "bus/bus.h"
+#include "core/bytes.h"
 #include "messages/state_chunks.h"
 #include "viewer/image_parts.h"
 #include "viewer/scene/scene.h"

@@ -40,7 +40,7 @@ constexpr double kKltConverged_px = 0.03;
 // Largest distance between a feature and itself tracked back.
 constexpr double kMaxForwardBackward_px = 0.7;
 // Contrast limit of the histogram equalisation, which gives dark corners of a room features too.
-constexpr double kEqualizerClip = 3.0;
+constexpr double kEqualiserClip = 3.0;
 
 Eigen::Vector2d ToEigen(const cv::Point2f& p) { return {p.x, p.y}; }
 
@@ -54,7 +54,7 @@ bool Nearer(const cv::Point2f& a, const cv::Point2f& b, double distance_px) {
 }  // namespace
 
 Tracker::Tracker(const CameraModel& camera, const TrackerOptions& options)
-    : camera_(camera), options_(options), equalizer_(kEqualizerClip) {}
+    : camera_(camera), options_(options), equaliser_(kEqualiserClip) {}
 
 void Tracker::Reset() {
   features_.clear();
@@ -88,9 +88,9 @@ const TrackedFrame& Tracker::Track(int64_t utime, const cv::Mat& image,
 
 void Tracker::Prepare(const cv::Mat& image) {
   std::swap(pyramid_, last_pyramid_);
-  const cv::Mat equalized = equalizer_.Apply(image);
+  const cv::Mat equalised = equaliser_.Apply(image);
   pyramid_.clear();
-  cv::buildOpticalFlowPyramid(equalized, pyramid_, cv::Size(kKltWindow_px, kKltWindow_px),
+  cv::buildOpticalFlowPyramid(equalised, pyramid_, cv::Size(kKltWindow_px, kKltWindow_px),
                               kKltLevels - 1, true);
 }
 

@@ -18,7 +18,7 @@
 #include <vector>
 
 #include "core/camera_model.h"
-#include "vio/front_end/equalizer.h"
+#include "vio/front_end/equaliser.h"
 #include "vio/front_end/reference_patch.h"
 #include "vio/front_end/tracks.h"
 #include "vio/front_end/two_view_check.h"
@@ -104,7 +104,7 @@ class Tracker {
 
   CameraModel camera_;
   TrackerOptions options_;
-  Equalizer equalizer_;
+  Equaliser equaliser_;
   Pyramid pyramid_;  // of the newest image
   Pyramid last_pyramid_;
   std::vector<Feature> features_;  // oldest first

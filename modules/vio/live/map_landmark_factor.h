@@ -1,6 +1,6 @@
 #pragma once
 
-// The reprojection residual of a map landmark, for window_localization.h.
+// The reprojection residual of a map landmark, for window_localisation.h.
 //
 //   p = c + Rz(yaw) (p_map - c) + shift,   y = T_cam_body T_body_map p,   r = y.xy / y.z - ray
 //
@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "core/rigid3.h"
-#include "vio/live/window_localization.h"
+#include "vio/live/window_localisation.h"
 
 namespace pangea::vio {
 

@@ -26,7 +26,7 @@ class ShownPose {
   // False, and nothing changes, if the correction is of another map or its revision is not higher
   // than all before.
   bool Correct(const Correction& correction);
-  // Replaces the target of the blending by a refined T_map_odom (map_localization.h).
+  // Replaces the target of the blending by a refined T_map_odom (map_localisation.h).
   void Sharpen(const Rigid3& T_map_odom) { target_ = T_map_odom; }
   // Returns T_map_body for an odometry pose. Call with ascending `utime`.
   Rigid3 Show(int64_t utime, const Rigid3& T_odom_body);

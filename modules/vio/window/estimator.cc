@@ -9,7 +9,7 @@
 #include "vio/imu/imu_buffer.h"
 #include "vio/imu/imu_noise.h"
 #include "vio/imu/stationary_detector.h"
-#include "vio/initialization/initialiser.h"
+#include "vio/initialisation/initialiser.h"
 #include "vio/keyframes/frame_choice.h"
 #include "vio/keyframes/keyframe_edges.h"
 #include "vio/keyframes/track_history.h"

@@ -1,0 +1,233 @@
+#include "server/server.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <functional>
+#include <set>
+#include <stdexcept>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "bus/process.h"
+#include "options/nearest_word.h"
+#include "processes/child_process.h"
+#include "processes/kept_processes.h"
+#include "server/checkpoints.h"
+#include "server/server_processes.h"
+
+namespace pangea {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kServerStopGrace_s = 5;
+constexpr const char* kGateway = "gateway";
+constexpr const char* kBridge = "bridge";
+constexpr const char* kThinningOptions = "thinning.yaml";  // of pangea-site compact
+// Processes that workers run, and a server on several hosts does not.
+constexpr const char* kVerifiers[] = {"fusion", "inter_map_ba"};
+constexpr std::chrono::milliseconds kServerLookInterval{100};
+
+void Say(const std::string& line) {
+  fmt::print("{}\n", line);
+  std::fflush(stdout);
+}
+
+std::vector<std::string> Command(const std::string& process, const ServerSetup& options) {
+  std::vector<std::string> argv{ProgramOf(process)};
+  if (process == "agent_handler") {
+    argv.insert(argv.end(), {"--link", options.link, "--server", options.bus, "--journal",
+                             options.journal.string(), "--keys", options.keys.string(),
+                             "--checkpoints", options.checkpoints.string()});
+    if (!options.cluster.nats.empty()) {
+      argv.push_back("--replicated");
+    }
+  } else {
+    argv.insert(argv.end(), {"--bus", options.bus});
+  }
+  if (process == "anchors" && !options.http.empty()) {
+    argv.insert(argv.end(), {"--http", options.http});
+    for (const std::string& origin : options.origins) {
+      argv.insert(argv.end(), {"--allow-origin", origin});
+    }
+    for (const std::string& name : options.names) {
+      argv.insert(argv.end(), {"--name", name});
+    }
+  }
+  if (const auto file = options.options.find(process); file != options.options.end()) {
+    argv.insert(argv.end(), {"--options", file->second.string()});
+  }
+  return argv;
+}
+
+std::vector<std::string> GatewayCommand(const ServerSetup& options) {
+  return {ProgramOf(kGateway),
+          "--site",
+          options.site.string(),
+          "--bus",
+          options.bus,
+          "--link",
+          options.link,
+          "--port",
+          std::to_string(*options.phone_port)};
+}
+
+bool IsVerifier(const std::string& process) {
+  return std::ranges::find(kVerifiers, process) != std::end(kVerifiers);
+}
+
+bool IsServerProcess(const std::string& process) {
+  return std::ranges::find(kServerProcesses, process) != std::end(kServerProcesses);
+}
+
+// Restarts ended processes; true if one was given up that the server needs. A gateway that has run
+// is not needed: what phones do to it must not end the map. One that cannot start is: somebody has
+// just asked for it, and can mend that.
+bool ReviveAll(KeptProcesses* kept) {
+  bool given_up = false;
+  for (const KeptProcesses::Revived& revived : kept->Revive()) {
+    const bool needed = revived.name != kGateway || !revived.ever_ran;
+    const std::string end =
+        needed ? "the server ends" : "the server goes on; phones need its next start";
+    Say(fmt::format("{} ended ({}); {}", revived.name, revived.why,
+                    revived.given_up
+                        ? fmt::format("given up after {} times; {}", revived.unexpected, end)
+                        : "starting it again"));
+    given_up |= revived.given_up && needed;
+  }
+  return given_up;
+}
+
+// Runs until a signal comes or a process is given up, then stops all. True if one was given up.
+bool KeepAlive(KeptProcesses* kept, const std::function<void()>& meanwhile) {
+  bool given_up = false;
+  while (!StopRequested() && !given_up) {
+    std::this_thread::sleep_for(kServerLookInterval);
+    given_up = ReviveAll(kept);
+    meanwhile();
+  }
+  kept->StopAll(kServerStopGrace_s);
+  return given_up;
+}
+
+void Start(KeptProcesses* kept, const std::string& process, const std::vector<std::string>& argv) {
+  kept->Start(process, argv);
+  Say(fmt::format("started {}", fmt::join(argv, " ")));
+}
+
+// Names a file that looks like a process' options and is not read by one.
+void SayUnusedOptions(const fs::path& folder) {
+  std::vector<std::string> known;
+  for (const std::string process : kServerProcesses) {
+    known.push_back(process + ".yaml");
+  }
+  std::set<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    files.insert(entry.path());
+  }
+  for (const fs::path& file : files) {
+    const std::string name = file.filename();
+    const bool is_options = file.extension() == ".yaml" || file.extension() == ".yml";
+    if (is_options && name != kThinningOptions && std::ranges::find(known, name) == known.end()) {
+      Say(fmt::format("{}: no process reads it{}", file.string(), NearestWordHint(name, known)));
+    }
+  }
+}
+
+}  // namespace
+
+std::string ProgramOf(const std::string& process) {
+  std::string name = "pangea-" + process;
+  std::ranges::replace(name, '_', '-');
+  return SiblingProgram(name);
+}
+
+double SteadySeconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+void AddProcessOptions(const std::string& text, ServerSetup* options) {
+  const size_t equals = text.find('=');
+  const std::string process = text.substr(0, equals);
+  if (equals == std::string::npos || !IsServerProcess(process)) {
+    throw std::runtime_error(fmt::format("--options {}: give PROCESS=FILE, PROCESS one of {}", text,
+                                         fmt::join(kServerProcesses, ", ")));
+  }
+  const fs::path file = text.substr(equals + 1);
+  if (!fs::is_regular_file(file)) {
+    throw std::runtime_error(fmt::format("--options {}: there is no file {}", text, file.string()));
+  }
+  options->options[process] = file;
+}
+
+void AddOptionsFolder(const fs::path& folder, ServerSetup* options) {
+  if (!fs::is_directory(folder)) {
+    throw std::runtime_error(
+        fmt::format("--options-dir {}: there is no such folder", folder.string()));
+  }
+  for (const std::string process : kServerProcesses) {
+    if (const fs::path file = folder / (process + ".yaml"); fs::exists(file)) {
+      options->options[process] = file;
+    }
+  }
+  SayUnusedOptions(folder);
+}
+
+int Serve(const ServerSetup& options) {
+  InstallSignalHandlers();
+  fs::create_directories(options.logs);
+  const bool is_core = !options.cluster.nats.empty();
+  Checkpoints checkpoints(options.checkpoints, options.journal, options.logs);
+  std::vector<std::pair<std::string, std::vector<std::string>>> commands;
+  for (const std::string process : kServerProcesses) {
+    if (is_core && IsVerifier(process)) {
+      continue;
+    }
+    std::vector<std::string> argv = Command(process, options);
+    const std::vector<std::string> checkpoint = checkpoints.ArgumentsOf(process);
+    argv.insert(argv.end(), checkpoint.begin(), checkpoint.end());
+    checkpoints.Add(process, argv);
+    commands.emplace_back(process, std::move(argv));
+  }
+  KeptProcesses kept(options.logs);
+  if (is_core) {
+    Say(fmt::format("stands by until this host has the site; see {}/bridge.txt",
+                    options.logs.string()));
+    if (!StandBy(options.cluster, options.journal, options.logs, &checkpoints)) {
+      return 0;
+    }
+    // The bridge starts first and ends last: only then may another host take the site.
+    Start(&kept, kBridge, BridgeCommand(BridgeRole::kCore, options.cluster, options.bus));
+  }
+  for (const auto& [process, argv] : commands) {
+    Start(&kept, process, argv);
+  }
+  if (options.phone_port) {
+    Start(&kept, kGateway, GatewayCommand(options));
+  }
+  Say(fmt::format("what they say is in {}; Ctrl-C ends them", options.logs.string()));
+  const bool given_up = KeepAlive(&kept, [&] { checkpoints.Tick(SteadySeconds()); });
+  Say("brings the checkpoints up to date; another Ctrl-C leaves them as they are");
+  checkpoints.Finish();
+  Say("ended");
+  return given_up ? 1 : 0;
+}
+
+int ServeAsWorker(const ServerSetup& options) {
+  InstallSignalHandlers();
+  fs::create_directories(options.logs);
+  KeptProcesses kept(options.logs);
+  Start(&kept, kBridge, BridgeCommand(BridgeRole::kWorker, options.cluster, options.bus));
+  for (const char* verifier : kVerifiers) {
+    Start(&kept, verifier, Command(verifier, options));
+  }
+  Say(fmt::format("what they say is in {}; Ctrl-C ends them", options.logs.string()));
+  const bool given_up = KeepAlive(&kept, [] {});
+  return given_up ? 1 : 0;
+}
+
+}  // namespace pangea

@@ -1,0 +1,275 @@
+#include "vio/initialisation/initialiser.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/imu/preintegration.h"
+#include "core/median.h"
+#include "vio/imu/imu_buffer.h"
+#include "vio/imu/imu_noise.h"
+#include "vio/initialisation/initial_solution.h"
+
+namespace pangea::vio {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr double kFrameSpacing_s = 0.09;  // images used for a moving start
+constexpr double kMinSpan_s = 1.0;        // shortest start-up window
+constexpr double kMaxSpan_s = 3.0;        // longest start-up window: older images are forgotten
+constexpr double kSampleMargin_s = 0.1;   // of samples before the oldest image
+constexpr size_t kMinTracks = 20;
+
+// The mean acceleration over a second or more is about gravity, however the device is moved. Far
+// less means a dead sensor or units of g; far more means other units.
+constexpr double kMinMeanAccel = 4;   // m/s^2
+constexpr double kMaxMeanAccel = 25;  // m/s^2
+// About one rotation per second, at which no image is sharp; a sensor in degrees/s shows more.
+constexpr double kMaxMeanGyro = 6;  // rad/s
+
+// Stationary: the image does not move, accelerometer and gyro are quiet.
+constexpr double kStationarySpan_s = 1.0;
+constexpr double kStationarySigmas =
+    2.2;  // median shift in sigmas of a pixel: noise alone gives 1.7
+// Limits as shares of the options: a whole second is tested, so they are tighter than later.
+constexpr double kStationaryAccel = 5.0 / 6;  // standard deviation, of accel_sigma
+constexpr double kStationaryGyro = 0.6;       // standard deviation, of gyro_rate
+// A stationary start assumes a smaller bias than a moving one; a larger one would tilt it.
+constexpr double kStationaryBias = 0.1 / 0.15;  // of accel_bias_sigma
+
+// Requirements on the result of a moving start.
+constexpr double kMaxVelocitySigma = 0.05;  // m/s, or
+constexpr double kMaxSpeedShare = 0.03;     // of the speed: 0.05 m/s at a typical flight's 1.7 m/s
+constexpr double kMaxTiltSigma = 0.035;     // rad
+constexpr double kMaxRmsSigmas = 1.8;
+constexpr double kMaxAccelBias = 0.8 / 0.15;  // of accel_bias_sigma
+
+double MedianDisplacement(const TrackedFrame& a, const TrackedFrame& b, size_t* shared) {
+  std::vector<double> displacement;
+  for (const Observation& first : a.observations) {
+    for (const Observation& second : b.observations) {
+      if (first.landmark_id == second.landmark_id) {
+        displacement.push_back((first.pixel - second.pixel).norm());
+      }
+    }
+  }
+  *shared = displacement.size();
+  if (displacement.empty()) {
+    return 1e9;
+  }
+  return Median(std::move(displacement));
+}
+
+double SpanSeconds(int64_t from_utime, int64_t to_utime) {
+  return 1e-6 * static_cast<double>(to_utime - from_utime);
+}
+
+double MeanMagnitude(const std::vector<ImuSample>& samples, Vector3d ImuSample::*of) {
+  double sum = 0;
+  for (const ImuSample& sample : samples) {
+    sum += (sample.*of).norm();
+  }
+  return sum / static_cast<double>(samples.size());
+}
+
+// The ray that the first row would have seen, for a distant point: with a shaking hand, the
+// rotation during the read-out is several pixels at the last row.
+Vector2d RayOfFirstRow(const Observation& seen, const CameraModel& camera,
+                       const BodyMotion& motion) {
+  if (camera.readout_s <= 0 || camera.height < 2) {
+    return seen.ray;
+  }
+  const double row_s = camera.readout_s * static_cast<double>(seen.pixel.y()) / (camera.height - 1);
+  const Eigen::Quaterniond& q_body_cam = camera.T_body_cam.q;
+  const Vector3d ray =
+      q_body_cam.conjugate() * (motion.After(row_s).q * (q_body_cam * seen.ray.homogeneous()));
+  return ray.z() > 0 ? Vector2d(ray.hnormalized()) : seen.ray;
+}
+
+}  // namespace
+
+Initialiser::Initialiser(const CameraModel& camera, const ImuNoise& noise, double pixel_sigma,
+                         const StartSigmas& sigmas, const StationaryOptions& stationary)
+    : camera_(camera),
+      noise_(noise),
+      pixel_sigma_(pixel_sigma),
+      sigmas_(sigmas),
+      stationary_(stationary) {}
+
+InitialResult Initialiser::AddFrame(const TrackedFrame& frame, std::span<const ImuSample> imu,
+                                    double stamp_sigma_s) {
+  sigmas_.stamp_s = stamp_sigma_s;
+  samples_.insert(samples_.end(), imu.begin(), imu.end());
+  if (samples_.empty() || samples_.back().utime < frame.utime) {
+    return {std::nullopt, "no inertial samples up to the image's time"};
+  }
+  if (!frames_.empty() && SpanSeconds(frames_.back().utime, frame.utime) < kFrameSpacing_s) {
+    return {std::nullopt, why_not_};
+  }
+  frames_.push_back(frame);
+  while (SpanSeconds(frames_.front().utime, frame.utime) > kMaxSpan_s) {
+    frames_.erase(frames_.begin());
+  }
+  std::erase_if(samples_, [&](const ImuSample& sample) {
+    return SpanSeconds(sample.utime, frames_.front().utime) > kSampleMargin_s;
+  });
+  InitialResult result = Try();
+  why_not_ = result.reason;
+  return result;
+}
+
+InitialResult Initialiser::Try() {
+  const double span = SpanSeconds(frames_.front().utime, frames_.back().utime);
+  if (span < kMinSpan_s) {
+    return {std::nullopt, fmt::format("collecting images: {:.1f} of {:.1f} s", span, kMinSpan_s)};
+  }
+  const double accel = MeanMagnitude(samples_, &ImuSample::accel);
+  if (!(accel > kMinMeanAccel && accel < kMaxMeanAccel)) {
+    return {std::nullopt,
+            fmt::format("the accelerometer shows {:.2f} m/s^2 on average, where gravity is {:.1f}",
+                        accel, kGravity)};
+  }
+  const double gyro = MeanMagnitude(samples_, &ImuSample::gyro);
+  if (gyro > kMaxMeanGyro) {
+    return {std::nullopt,
+            fmt::format("the gyroscope shows {:.1f} rad/s on average: is it in degrees?", gyro)};
+  }
+  if (auto stationary = TryStationary()) {
+    return {stationary, ""};
+  }
+  return TryMoving();
+}
+
+std::optional<InitialState> Initialiser::TryStationary() const {
+  const int64_t now = frames_.back().utime;
+  const auto oldest = std::find_if(frames_.begin(), frames_.end(), [now](const TrackedFrame& one) {
+    return SpanSeconds(one.utime, now) <= kStationarySpan_s + kFrameSpacing_s;
+  });
+  const std::vector<ImuSample> samples = SamplesBetween(samples_, oldest->utime, now);
+  size_t shared = 0;
+  const double moved = MedianDisplacement(*oldest, frames_.back(), &shared);
+  if (samples.size() < 20 || shared < kMinTracks || moved > kStationarySigmas * pixel_sigma_) {
+    return std::nullopt;
+  }
+  const SampleMoments moments = MomentsOf(samples);
+  const double max_accel = kStationaryAccel * stationary_.accel_sigma;
+  const double max_gyro = kStationaryGyro * kMaxStationaryRate;
+  if (moments.accel_variance > max_accel * max_accel ||
+      moments.gyro_variance > max_gyro * max_gyro) {
+    return std::nullopt;
+  }
+  InitialState state;
+  state.stationary = true;
+  ImuState imu;
+  imu.T_odom_body.q = Eigen::Quaterniond::FromTwoVectors(moments.accel_mean, Vector3d::UnitZ());
+  imu.gyro_bias = moments.gyro_mean;
+  state.frames.push_back({frames_.back(), imu, 0});
+  // For a stationary body, an accelerometer bias cannot be distinguished from a tilt: so the bias
+  // determines the uncertainty of the tilt.
+  Eigen::Matrix<double, 15, 1> sigma;
+  const double bias_sigma = kStationaryBias * sigmas_.accel_bias;
+  sigma << Vector3d(bias_sigma / kGravity, bias_sigma / kGravity, 1e-4), Vector3d::Constant(1e-4),
+      Vector3d::Constant(0.01), Vector3d::Constant(0.002), Vector3d::Constant(bias_sigma);
+  state.covariance = sigma.cwiseAbs2().asDiagonal();
+  return state;
+}
+
+std::vector<StartFrame> Initialiser::StartFrames() const {
+  const int64_t shift = std::llround(1e6 * time_offset_change_s_);
+  ImuBuffer samples(noise_);
+  samples.Add(samples_);
+  std::vector<StartFrame> frames;
+  for (const TrackedFrame& frame : frames_) {
+    StartFrame start;
+    start.utime = frame.utime + shift;
+    if (!frames.empty()) {
+      start.imu = SamplesBetween(samples_, frames.back().utime, start.utime);
+    }
+    const BodyMotion motion = samples.MotionFrom(start.utime, camera_.readout_s, {}, ImuState{});
+    for (const Observation& observation : frame.observations) {
+      start.rays[observation.landmark_id] = RayOfFirstRow(observation, camera_, motion);
+    }
+    frames.push_back(std::move(start));
+  }
+  return frames;
+}
+
+InitialResult Initialiser::TryMoving() {
+  const std::vector<StartFrame> frames = StartFrames();
+  InitialResult result = TryMoving(frames);
+  if (result.state || !result.contradicts) {
+    return result;
+  }
+  // The time offset may differ from the calibrated one.
+  const auto offset = SolveTimeOffset(frames, camera_.T_body_cam, samples_, noise_);
+  if (!offset) {
+    return result;
+  }
+  time_offset_change_s_ += *offset;
+  return TryMoving(StartFrames());
+}
+
+// Empty if the start is good.
+std::optional<InitialResult> Initialiser::Refusal(
+    const std::optional<RefinedStart>& refined) const {
+  if (!refined) {
+    return InitialResult{std::nullopt, "the start-up bundle adjustment did not converge"};
+  }
+  if (refined->inlier_share < kMinInlierShare || refined->rms_sigma > kMaxRmsSigmas) {
+    const std::string found = refined->inlier_share < kMinInlierShare
+                                  ? fmt::format("{:.0f} % inliers", 100 * refined->inlier_share)
+                                  : fmt::format("{:.1f} sigma", refined->rms_sigma);
+    return InitialResult{std::nullopt, "the start does not explain the images: " + found, true};
+  }
+  // The scale must be certain, so the limit is relative to the speed: with a limit in m/s, a
+  // solution at half the true scale would pass first.
+  const double speed = refined->states.back().v_odom_body.norm();
+  const double max_velocity_sigma = std::max(kMaxVelocitySigma, kMaxSpeedShare * speed);
+  if (refined->velocity_sigma > max_velocity_sigma || refined->tilt_sigma > kMaxTiltSigma) {
+    return InitialResult{
+        std::nullopt,
+        fmt::format("not enough motion yet: velocity known to {:.2f} m/s, tilt to {:.1f} degrees",
+                    refined->velocity_sigma, refined->tilt_sigma * 57.3)};
+  }
+  if (refined->states.back().accel_bias.norm() > kMaxAccelBias * sigmas_.accel_bias) {
+    return InitialResult{std::nullopt, "the start needs an implausible accelerometer bias"};
+  }
+  return std::nullopt;
+}
+
+InitialResult Initialiser::TryMoving(const std::vector<StartFrame>& frames) const {
+  const auto gyro_bias = SolveGyroBias(frames, camera_.T_body_cam, noise_);
+  if (!gyro_bias) {
+    return {std::nullopt, "too few features are tracked from image to image"};
+  }
+  const auto linear = SolveLinear(frames, camera_.T_body_cam, noise_, *gyro_bias);
+  if (!linear) {
+    return {std::nullopt, "the motion does not determine velocity and gravity yet"};
+  }
+  const ImuNoise noise = MeasuredNoise(noise_, samples_);
+  const auto refine = [&](const LinearStart& start) {
+    return Refine(frames, camera_.T_body_cam, noise, *gyro_bias, start, sigmas_);
+  };
+  std::optional<RefinedStart> refined = refine(*linear);
+  if (auto refusal = Refusal(refined)) {
+    return *refusal;
+  }
+  refined = BestOfScales(refine, *linear, *refined);
+  if (auto refusal = Refusal(refined)) {
+    return *refusal;
+  }
+  InitialState state;
+  state.time_offset_change_s = time_offset_change_s_;
+  state.time_offset_error_s = refined->time_offset_error_s;
+  for (size_t i = 0; i < frames_.size(); ++i) {
+    state.frames.push_back({frames_[i], refined->states[i], refined->stamp_errors_s[i]});
+  }
+  return {state, ""};
+}
+
+}  // namespace pangea::vio
