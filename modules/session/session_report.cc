@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iostream>
 #include <map>
 
 #include "bus/node.h"
@@ -164,6 +165,14 @@ ReportOutcome ReportLog(const fs::path& log, const SessionRecord& known, const f
   ForgetAnchorsOfAReplay(&input);
   NoteOptions(log, readings, &input);
   return OutcomeOf(input, out, readings);
+}
+
+int PrintReport(const ReportOutcome& outcome) {
+  std::cout << outcome.text << std::flush;
+  for (const std::string& missed : outcome.missed) {
+    std::cerr << fmt::format("pangea-session: {}\n", missed);
+  }
+  return outcome.missed.empty() ? 0 : kMissed;
 }
 
 void WriteRecordings(const SessionScript& script, const fs::path& out) {

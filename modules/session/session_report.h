@@ -28,6 +28,12 @@ ReportOutcome ReportRun(const SessionScript& script, const RunSummary& summary,
 ReportOutcome ReportLog(const std::filesystem::path& log, const SessionRecord& known,
                         const std::filesystem::path& out, LogReadings* readings);
 
+// Exit code of a session that misses an expectation, and of logs that differ.
+inline constexpr int kMissed = 2;
+
+// Prints the report, and on stderr the missed expectations. Returns the exit code, 0 or kMissed.
+int PrintReport(const ReportOutcome& outcome);
+
 // Writes the session's record (report/session_record.h) beside its log.
 void WriteRecordings(const SessionScript& script, const std::filesystem::path& out);
 
