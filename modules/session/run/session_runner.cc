@@ -13,9 +13,6 @@
 
 #include "bus/process.h"
 #include "files/make_folder.h"
-#include "files/text_file.h"
-#include "link/agent_key.h"
-#include "options/yaml_options.h"
 #include "processes/child_process.h"
 #include "processes/kept_processes.h"
 #include "server/server_processes.h"
@@ -24,6 +21,7 @@
 #include "session/processes/open_files.h"
 #include "session/processes/player.h"
 #include "session/run/session_monitor.h"
+#include "session/run/session_processes.h"
 #include "session/run/session_progress.h"
 
 namespace pangea::session {
@@ -43,14 +41,14 @@ constexpr int kNoPose = 2;  // exit code of pangea-vio: its recording gave no po
 class Runner {
  public:
   Runner(const SessionScript& script, const RunOptions& options)
-      : options_(options),
-        server_options_(script.options),
+      : script_(script),
+        options_(options),
         faults_(script.faults),
         buses_(OpenBuses(script, options)),
         monitor_(buses_),
         anchors_(PlanAnchors(script)),
         progress_(isatty(STDOUT_FILENO) != 0),
-        kept_(options.out / "logs") {
+        processes_(options.out, buses_) {
     for (const AgentScript& agent : script.agents) {
       players_.emplace_back().script = agent;
     }
@@ -62,7 +60,7 @@ class Runner {
     // The processes are single-threaded by design; BLAS must not start threads.
     setenv("OMP_NUM_THREADS", "1", 1);
     setenv("OPENBLAS_NUM_THREADS", "1", 1);
-    MakeKeys();
+    processes_.MakeKeys(script_);
     StartServer();
     StartLinks();
     Play();
@@ -74,7 +72,7 @@ class Runner {
       progress_.PrintLine(summary_.notes.back());
     }
     std::ranges::copy(anchors_.NotPlaced(), std::back_inserter(summary_.failures));
-    kept_.StopAll(kStopGrace_s);
+    processes_.kept().StopAll(kStopGrace_s);
     summary_.wall_s = Now() - begin_;
     summary_.status = monitor_.statuses();
     summary_.cpu_s = monitor_.CpuSeconds();
@@ -102,57 +100,13 @@ class Runner {
     return ids;
   }
 
-  fs::path KeyFile(int32_t agent_id) const { return options_.out / "keys" / KeyFileName(agent_id); }
-
-  // Keys that only this session's processes know.
-  void MakeKeys() {
-    fs::remove_all(options_.out / "keys");
-    MakeFolder(options_.out / "keys");
-    for (const Player& player : players_) {
-      MakeKeyFile(KeyFile(player.script.id), player.script.id);
-    }
-  }
-
-  template <typename Options>
-  std::string WriteOptions(const std::string& process, Options options) const {
-    YamlOptions yaml;
-    options.Visit(yaml);
-    return WriteOptionsText(process, yaml.Print());
-  }
-  std::string WriteOptionsText(const std::string& process, const std::string& yaml) const {
-    const fs::path file = options_.out / "logs" / (process + ".yaml");
-    WriteTextFile(file, yaml);
-    return file.string();
-  }
-
-  // lcm-logger refuses an existing file; a restarted one must continue it: append.
-  void KeepLogger(const std::string& name, const std::string& url, const fs::path& file) {
-    const auto logger = FindOnPath("lcm-logger");
-    if (!logger) {
-      throw std::runtime_error("lcm-logger is not on PATH: install liblcm-bin");
-    }
-    kept_.Start(name, {logger->string(), "--append", "--lcm-url=" + url, file.string()});
-  }
-
   void StartServer() {
-    KeepLogger("logger_server", buses_.server, options_.out / "session.lcm");
-    kept_.Start("agent_handler", {SiblingProgram("pangea-agent-handler"), "--link", buses_.link,
-                                  "--server", buses_.server, "--journal", options_.journal.string(),
-                                  "--keys", (options_.out / "keys").string(), "--options",
-                                  WriteOptions("agent_handler", server_options_.agent_handler)});
-    const std::map<std::string, std::string> options = TextsByProcess(server_options_);
-    for (const std::string name : kServerProcesses) {
-      if (name != "agent_handler") {
-        std::string program = "pangea-" + name;
-        std::ranges::replace(program, '_', '-');
-        std::vector<std::string> argv{SiblingProgram(program), "--bus", buses_.server};
-        if (const auto text = options.find(name); text != options.end()) {
-          argv.insert(argv.end(), {"--options", WriteOptionsText(name, text->second)});
-        }
-        kept_.Start(name, argv);
-      }
-      server_names_.push_back(name);
-    }
+    processes_.StartServer(script_.options, options_.journal);
+    server_names_.assign(std::begin(kServerProcesses), std::end(kServerProcesses));
+    WaitForServer();
+  }
+
+  void WaitForServer() {
     const double deadline = Now() + kStartTimeout_s;
     while (!monitor_.Idle(server_names_, 0) && !StopRequested()) {
       if (Now() > deadline) {
@@ -169,28 +123,10 @@ class Runner {
   }
 
   void StartLinks() {
-    for (const Player& player : players_) {
-      const int32_t id = player.script.id;
-      const std::string bus = buses_.agents.at(id);
-      KeepLogger(fmt::format("logger_agent_{}", id), bus,
-                 options_.out / fmt::format("agent_{}.lcm", id));
-      if (player.script.link) {
-        StartLinkEmulator(id, *player.script.link);
-      }
-      anchors_.Join(player.script, &monitor_.agent_bus(id));
-      const std::string name = fmt::format("uplink_{}", id);
-      kept_.Start(name, {SiblingProgram("pangea-uplink"), "--agent", std::to_string(id), "--key",
-                         KeyFile(id).string(), "--bus", bus, "--link", buses_.LinkOf(id), "--spool",
-                         (options_.out / fmt::format("spool_{}", id)).string(), "--options",
-                         WriteOptions(name, player.script.uplink)});
+    for (const AgentScript& agent : script_.agents) {
+      anchors_.Join(agent, &monitor_.agent_bus(agent.id));
+      processes_.StartUplink(agent);
     }
-  }
-
-  void StartLinkEmulator(int32_t id, const LinkConditions& conditions) {
-    const std::string name = fmt::format("link_emulator_{}", id);
-    kept_.Start(name, {SiblingProgram("pangea-link-emulator"), "--agent", std::to_string(id),
-                       "--agent-link", buses_.LinkOf(id), "--server-link", buses_.link, "--bus",
-                       buses_.agents.at(id), "--options", WriteOptions(name, conditions)});
   }
 
   // A killed player of stored keyframes starts again from the start; the uplink ignores repeats.
@@ -204,7 +140,8 @@ class Runner {
     argv.insert(argv.end(), input.begin(), input.end());
     const std::string name = fmt::format("{}_{}", stored ? "keyframes" : "vio", id);
     if (player.script.vio_options) {
-      argv.insert(argv.end(), {"--options", WriteOptions(name, *player.script.vio_options)});
+      argv.insert(argv.end(),
+                  {"--options", processes_.WriteOptions(name, *player.script.vio_options)});
     }
     player.child.emplace(name, std::move(argv), options_.out / "logs" / (name + ".txt"));
     if (player.started_s == 0) {
@@ -309,7 +246,7 @@ class Runner {
   }
 
   void Revive() {
-    for (const KeptProcesses::Revived& revived : kept_.Revive()) {
+    for (const KeptProcesses::Revived& revived : processes_.kept().Revive()) {
       if (revived.given_up) {
         summary_.failures.push_back(fmt::format(
             "{} ended {} times and was given up ({}); its output is in {}", revived.name,
@@ -324,7 +261,7 @@ class Runner {
   }
 
   ChildProcess* Find(const std::string& name) {
-    if (ChildProcess* kept = kept_.Find(name)) {
+    if (ChildProcess* kept = processes_.kept().Find(name)) {
       return kept;
     }
     for (Player& player : players_) {
@@ -340,7 +277,7 @@ class Runner {
       if (ChildProcess* child = Find(name)) {
         child->Signal(SIGKILL);
       }
-      kept_.ExpectEnd(name);
+      processes_.kept().ExpectEnd(name);
     }
     std::set<std::string> full;
     if (!SessionTimeStops()) {
@@ -385,7 +322,8 @@ class Runner {
     for (const Player& player : players_) {
       names.push_back(fmt::format("uplink_{}", player.script.id));
     }
-    std::erase_if(names, [this](const std::string& name) { return kept_.GivenUp(name); });
+    std::erase_if(names,
+                  [this](const std::string& name) { return processes_.kept().GivenUp(name); });
     return names;
   }
 
@@ -416,14 +354,14 @@ class Runner {
     }
   }
 
+  const SessionScript& script_;
   RunOptions options_;
-  SessionServerOptions server_options_;
   FaultSchedule faults_;
   Buses buses_;
   SessionMonitor monitor_;
   AnchorApp anchors_;
   SessionProgress progress_;
-  KeptProcesses kept_;
+  SessionProcesses processes_;
   std::vector<Player> players_;
   std::vector<std::string> server_names_;
   std::set<std::string> refused_disks_;  // processes already reported
