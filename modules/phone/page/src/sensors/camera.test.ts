@@ -22,3 +22,26 @@ test("a camera that gives no video is not left open", async () => {
   await assert.rejects(Camera.open(), /interrupted/);
   assert.equal(track.readyState, "ended");
 });
+
+test("each image of the camera is closed, those that come after its end too", async () => {
+  installBrowser(async () => {});
+  const frames = Array.from({ length: 6 }, (_, i) => ({ timestamp: 33_000 * i, closed: 0, close() { ++this.closed; } }));
+  const readable = new ReadableStream({
+    start(controller) {
+      for (const frame of frames) controller.enqueue(frame);
+      controller.close();
+    },
+  });
+  const globals = {
+    window: { MediaStreamTrackProcessor: true },
+    MediaStreamTrackProcessor: class { readable = readable; },
+    OffscreenCanvas: class { getContext() { throw new Error("no image"); } },
+    createImageBitmap: async () => ({ close() {} }),
+    screen: {},
+  };
+  for (const [name, value] of Object.entries(globals)) Object.defineProperty(globalThis, name, { value, configurable: true });
+  const camera = await Camera.open();
+  camera.stop();
+  await new Promise((resolve) => setTimeout(resolve, 50));
+  assert.deepEqual(frames.map(({ closed }) => closed), [1, 1, 1, 1, 1, 1]);
+});
