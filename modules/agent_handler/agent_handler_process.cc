@@ -332,7 +332,7 @@ void AgentHandlerProcess::PublishStatus(int64_t now_utime) {
 
 void AgentHandlerProcess::Tick(int64_t now_utime) {
   archive_.set_now_utime(now_utime);
-  if (next_status_utime_ == 0) {
+  if (next_have_utime_ == 0) {
     node_.Set("ready_utime", now_utime);
   }
   if (now_utime >= next_have_utime_) {
@@ -344,8 +344,7 @@ void AgentHandlerProcess::Tick(int64_t now_utime) {
       AskForState(node_, map);
     }
   }
-  if (now_utime >= next_status_utime_) {
-    next_status_utime_ = now_utime + kSecond_us;
+  if (node_.StatusIsDue(now_utime)) {
     PublishStatus(now_utime);
   }
 }

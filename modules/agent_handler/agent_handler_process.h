@@ -86,7 +86,6 @@ class AgentHandlerProcess : public PolledProcess {
   MissingStates missing_corrections_;        // for maps that were in the journal at the start
   int64_t now_us_ = 0;
   int64_t next_have_utime_ = 0;
-  int64_t next_status_utime_ = 0;
 };
 
 }  // namespace pangea

@@ -142,8 +142,7 @@ void AnchorsProcess::Tick(int64_t now_utime) {
   RequestMissingEdits(now_utime);
   PublishDue(now_utime);
   PublishOthers(now_utime);
-  if (now_utime >= next_status_utime_) {
-    next_status_utime_ = now_utime + kSecond_us;
+  if (node_.StatusIsDue(now_utime)) {
     PublishStatus(now_utime);
   }
 }

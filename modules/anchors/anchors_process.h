@@ -74,7 +74,6 @@ class AnchorsProcess : public Process {
   int64_t next_request_utime_ = 0;
   int64_t next_publish_utime_ = 0;
   int64_t next_others_utime_ = 0;
-  int64_t next_status_utime_ = 0;
 };
 
 }  // namespace pangea

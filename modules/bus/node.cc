@@ -14,6 +14,7 @@ namespace {
 
 constexpr size_t kHandlingWindow = 1000;
 constexpr size_t kMaxReasons = 50;
+constexpr int64_t kStatusInterval_us = 1'000'000;
 
 float ResidentMegabytes() {
   std::ifstream statm("/proc/self/statm");
@@ -116,6 +117,14 @@ status_t Node::Status(int64_t now_utime, int64_t pending, const std::string& sum
   status.counters = ToCounters(counters);
   status.num_counters = static_cast<int16_t>(status.counters.size());
   return status;
+}
+
+bool Node::StatusIsDue(int64_t now_utime) {
+  if (now_utime < next_status_utime_) {
+    return false;
+  }
+  next_status_utime_ = now_utime + kStatusInterval_us;
+  return true;
 }
 
 void Node::PublishStatus(int64_t now_utime, int64_t pending, const std::string& summary) {

@@ -111,6 +111,8 @@ class Node {
   // `pending`: number of items that wait for this process, 0 when idle. Status adds the process'
   // memory and CPU time.
   status_t Status(int64_t now_utime, int64_t pending, const std::string& summary) const;
+  // True at the first call, then once a second.
+  bool StatusIsDue(int64_t now_utime);
   void PublishStatus(int64_t now_utime, int64_t pending, const std::string& summary);
 
  private:
@@ -122,6 +124,7 @@ class Node {
   std::vector<Bus*> heard_;
   StateChanges state_changes_;
   int64_t started_utime_ = 0;
+  int64_t next_status_utime_ = 0;
   int64_t messages_in_ = 0;
   int64_t messages_out_ = 0;
   int64_t dropped_ = 0;

@@ -16,7 +16,6 @@
 namespace pangea {
 namespace {
 
-constexpr int64_t kCoreSecond_us = 1'000'000;
 constexpr int64_t kPollInterval_us = 20'000;
 constexpr char kJournalOwner[] = "agent_handler";
 constexpr size_t kMaxAsked = 5000;
@@ -175,8 +174,7 @@ void CoreBridge::Tick(int64_t now_utime) {
     throw LeaseLost(fmt::format("another core has the site: {}", lease_.seen_holder()));
   }
   journal_.Tick(now_utime);
-  if (now_utime >= next_status_utime_) {
-    next_status_utime_ = now_utime + kCoreSecond_us;
+  if (node_.StatusIsDue(now_utime)) {
     PublishStatus(now_utime);
   }
 }

@@ -74,7 +74,6 @@ class CoreBridge : public Process {
   int64_t told_bytes_ = -1;  // replicated bytes of the journal, as last told
   int64_t next_told_utime_ = 0;
   int64_t next_poll_utime_ = 0;
-  int64_t next_status_utime_ = 0;
 };
 
 }  // namespace pangea

@@ -14,7 +14,6 @@
 namespace pangea {
 namespace {
 
-constexpr int64_t kWorkerSecond_us = 1'000'000;
 constexpr int64_t kRoundInterval_us = 20'000;
 // How often a match is checked for the earlier results that it waits for, and the longest wait. The
 // matches of a worker that died come after 5 s.
@@ -258,8 +257,7 @@ void WorkerBridge::BetweenMessages(int64_t now_utime) {
 
 void WorkerBridge::Tick(int64_t now_utime) {
   AskForOverdue(now_utime);
-  if (now_utime >= next_status_utime_) {
-    next_status_utime_ = now_utime + kWorkerSecond_us;
+  if (node_.StatusIsDue(now_utime)) {
     for (const std::string& ack_subject : outstanding_.AckSubjects()) {
       streams_.InProgress(ack_subject);
     }

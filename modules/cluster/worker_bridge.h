@@ -87,7 +87,6 @@ class WorkerBridge : public Process {
   std::deque<Request> requests_;
   bool has_keyframes_ = false;  // all keyframes of the stream were once published
   int64_t next_round_utime_ = 0;
-  int64_t next_status_utime_ = 0;
   int64_t num_results_ = 0;
 };
 

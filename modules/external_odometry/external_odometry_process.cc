@@ -10,11 +10,7 @@
 #include "pangea/pose_t.hpp"
 
 namespace pangea {
-namespace {
-
-constexpr int64_t kStatusInterval_us = 1'000'000;
-
-}  // namespace
+namespace {}  // namespace
 
 ExternalOdometryProcess::ExternalOdometryProcess(Bus& bus, int32_t agent_id,
                                                  const CameraModel& camera,
@@ -99,8 +95,7 @@ void ExternalOdometryProcess::Publish(const Step& now, bool tracking) {
 
 void ExternalOdometryProcess::Tick(int64_t now_utime) {
   publisher_.Tick(now_utime);
-  if (now_utime >= next_status_utime_) {
-    next_status_utime_ = now_utime + kStatusInterval_us;
+  if (node_.StatusIsDue(now_utime)) {
     node_.PublishStatus(now_utime, publisher_.Unacknowledged(), "poses of another odometry");
   }
 }

@@ -76,7 +76,6 @@ class ExternalOdometryProcess : public Process {
   std::optional<Step> last_;            // the last pose of this map
   std::optional<int64_t> last_image_utime_;
   bool lost_ = false;  // since last_
-  int64_t next_status_utime_ = 0;
 };
 
 }  // namespace pangea

@@ -106,8 +106,7 @@ void GlobalBaProcess::Tick(int64_t now_utime) {
       Publish(*refined);
     }
   }
-  if (now_utime >= next_status_utime_) {
-    next_status_utime_ = now_utime + kSecond;
+  if (node_.StatusIsDue(now_utime)) {
     PublishStatus(now_utime);
   }
   if (now_utime >= last_input_utime_ + kQuiet_us && !node_.bus().MoreWaits() &&

@@ -61,7 +61,6 @@ class GlobalBaProcess : public Process {
   int64_t num_inputs_ = 0;
   int64_t num_inputs_at_change_ = 0;
   int64_t last_input_utime_ = 0;
-  int64_t next_status_utime_ = 0;
 };
 
 }  // namespace pangea

@@ -9,7 +9,6 @@
 namespace pangea {
 namespace {
 
-constexpr int64_t kStatusInterval_us = 1'000'000;
 constexpr int kIdle_ms = 20;
 
 }  // namespace
@@ -68,10 +67,9 @@ void LinkEmulatorProcess::Count(const Way& way) {
 }
 
 void LinkEmulatorProcess::Tick(int64_t now_utime) {
-  if (now_utime < next_status_utime_) {
+  if (!node_.StatusIsDue(now_utime)) {
     return;
   }
-  next_status_utime_ = now_utime + kStatusInterval_us;
   Count(up_);
   Count(down_);
   const auto pending = static_cast<int64_t>(up_.emulator.under_way() + down_.emulator.under_way());

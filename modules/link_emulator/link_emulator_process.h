@@ -41,7 +41,6 @@ class LinkEmulatorProcess : public PolledProcess {
   Node node_;
   Way up_;
   Way down_;
-  int64_t next_status_utime_ = 0;
 };
 
 }  // namespace pangea

@@ -16,7 +16,6 @@ namespace pangea {
 namespace {
 
 constexpr uint32_t kCheckpointFormat = 4;
-constexpr int64_t kSecond = 1'000'000;
 constexpr char kJournalOwner[] = "agent_handler";
 
 }  // namespace
@@ -173,8 +172,7 @@ bool CandidateProcess::VerifyNext() {
 
 void CandidateProcess::Tick(int64_t now_utime) {
   journal_.Tick(now_utime, num_pending() <= kMaxWaiting / 2);
-  if (now_utime >= next_status_utime_) {
-    next_status_utime_ = now_utime + kSecond;
+  if (node_.StatusIsDue(now_utime)) {
     PublishStatus(now_utime);
   }
 }

@@ -79,7 +79,6 @@ class CandidateProcess : public Process {
   std::deque<Ready> ready_;
   std::set<int64_t> verified_;   // constraint ids
   std::deque<Constraint> sent_;  // newest results, for retransmission
-  int64_t next_status_utime_ = 0;
   int64_t num_accepted_ = 0;
 };
 

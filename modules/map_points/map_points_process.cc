@@ -15,7 +15,6 @@ namespace pangea {
 namespace {
 
 constexpr uint32_t kCheckpointFormat = 2;
-constexpr int64_t kSecond = 1'000'000;
 
 }  // namespace
 
@@ -84,8 +83,7 @@ void MapPointsProcess::OnPose(const pose_t& message) {
 
 void MapPointsProcess::Tick(int64_t now_utime) {
   journal_.Tick(now_utime);
-  if (now_utime >= next_status_utime_) {
-    next_status_utime_ = now_utime + kSecond;
+  if (node_.StatusIsDue(now_utime)) {
     PublishStatus(now_utime);
   }
 }

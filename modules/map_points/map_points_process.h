@@ -43,7 +43,6 @@ class MapPointsProcess : public Process {
   StateChunks states_;
   StateChunks refinements_;
   std::map<int32_t, int64_t> sent_utime_;  // by agent: utime of the pose at its last message
-  int64_t next_status_utime_ = 0;
 };
 
 }  // namespace pangea

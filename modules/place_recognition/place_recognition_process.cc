@@ -16,7 +16,6 @@ namespace pangea {
 namespace {
 
 constexpr uint32_t kCheckpointFormat = 3;
-constexpr int64_t kStatusInterval_us = 1'000'000;
 // Bounds: on matches kept for retransmission (beyond it the oldest are dropped), and on keyframes
 // that wait in a catch-up or for their turn (beyond it the first are recognised at once).
 constexpr size_t kMaxSentPerMap = 2000;
@@ -52,8 +51,7 @@ PlaceRecognitionProcess::PlaceRecognitionProcess(Bus& bus, const PlaceRecognitio
 void PlaceRecognitionProcess::Tick(int64_t now_utime) {
   journal_.Tick(now_utime);
   ReleaseHeldIfCaughtUp();
-  if (now_utime >= next_status_utime_) {
-    next_status_utime_ = now_utime + kStatusInterval_us;
+  if (node_.StatusIsDue(now_utime)) {
     PublishStatus(now_utime);
   }
 }

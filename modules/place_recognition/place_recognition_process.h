@@ -58,7 +58,6 @@ class PlaceRecognitionProcess : public Process {
   std::map<KeyframeId, PlaceMatch> known_matches_;   // from the journal; keyframe not seen yet
   std::deque<Keyframe> held_;                        // keyframes to be recognised, in order
   std::map<MapId, std::map<int32_t, Record>> sent_;  // newest of this run, to retransmit
-  int64_t next_status_utime_ = 0;
 };
 
 }  // namespace pangea

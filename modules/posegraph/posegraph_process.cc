@@ -145,8 +145,7 @@ void PoseGraphProcess::Tick(int64_t now_utime) {
     num_finished_ = num_arrived_;
     Finish();
   }
-  if (now_utime >= next_status_utime_) {
-    next_status_utime_ = now_utime + kSecond;
+  if (node_.StatusIsDue(now_utime)) {
     PublishStatus(now_utime);
   }
 }

@@ -77,7 +77,6 @@ class PoseGraphProcess : public Process {
   int64_t num_arrived_at_change_ = 0;
   int64_t last_change_utime_ = 0;
   int64_t num_finished_ = 0;  // num_arrived_ at the last Finish
-  int64_t next_status_utime_ = 0;
 };
 
 }  // namespace pangea

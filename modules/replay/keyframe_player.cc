@@ -8,11 +8,7 @@
 #include "files/progress.h"
 
 namespace pangea {
-namespace {
-
-constexpr int64_t kStatusInterval_us = 1'000'000;
-
-}  // namespace
+namespace {}  // namespace
 
 KeyframePlayer::KeyframePlayer(Bus& bus, const KeyframePlayerOptions& options,
                                std::vector<LoggedKeyframe> keyframes, int64_t now_utime)
@@ -38,8 +34,7 @@ void KeyframePlayer::PlayNext() {
 
 void KeyframePlayer::Tick(int64_t now_utime) {
   publisher_.Tick(now_utime);
-  if (now_utime >= next_status_utime_) {
-    next_status_utime_ = now_utime + kStatusInterval_us;
+  if (node_.StatusIsDue(now_utime)) {
     node_.PublishStatus(now_utime, publisher_.Unacknowledged(),
                         fmt::format("agent {}: stored keyframe {} of {}", options_.agent_id, next_,
                                     keyframes_.size()));

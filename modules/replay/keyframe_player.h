@@ -42,7 +42,6 @@ class KeyframePlayer : public Process {
   Node node_;
   ReliableKeyframePublisher publisher_;
   size_t next_ = 0;
-  int64_t next_status_utime_ = 0;
 };
 
 // Plays all keyframes at the given rate; then waits until all are acknowledged, or no

@@ -20,7 +20,6 @@ namespace pangea {
 namespace {
 
 constexpr int64_t kHaveInterval_us = 400'000;
-constexpr int64_t kStatusInterval_us = 1'000'000;
 constexpr int kBusy_ms = 4;
 constexpr int kIdle_ms = 20;
 
@@ -325,10 +324,9 @@ std::string UplinkProcess::RateForPeople() {
 
 void UplinkProcess::Tick(int64_t now_utime) {
   now_utime_ = now_utime;
-  if (now_utime < next_status_utime_) {
+  if (!node_.StatusIsDue(now_utime)) {
     return;
   }
-  next_status_utime_ = now_utime + kStatusInterval_us;
   const Sender& sender = uplink_.sender();
   const int64_t spooled = num_waiting();
   const auto edits_waiting = static_cast<int64_t>(anchors_.edits_waiting());

@@ -67,7 +67,6 @@ class UplinkProcess : public PolledProcess {
   int64_t now_utime_ = 0;
   int64_t next_have_us_ = 0;
   int64_t last_others_ = 0;  // number of the newest OTHERS packet of this session
-  int64_t next_status_utime_ = 0;
   std::map<MapId, int32_t> last_have_;
 };
 

@@ -14,7 +14,6 @@
 namespace pangea::viewer {
 namespace {
 
-constexpr int64_t kSecond = 1'000'000;
 // Keyframes beyond this number would not be shown anyway.
 constexpr auto kMaxSeqAsked = static_cast<int32_t>(Scene::kMaxKeyframes);
 
@@ -113,8 +112,7 @@ void ViewerProcess::Tick(int64_t now_utime) {
   scene_.SetTime(clock_.now_s);
   AskForMissing(now_utime);
   PublishRequests();
-  if (now_utime >= next_status_utime_) {
-    next_status_utime_ = now_utime + kSecond;
+  if (node_.StatusIsDue(now_utime)) {
     node_.Set("keyframes", static_cast<int64_t>(scene_.keyframes().size()));
     node_.Set("left_out", scene_.num_left_out());
     node_.PublishStatus(now_utime, 0,

@@ -60,7 +60,6 @@ class ViewerProcess : public Process, public Show {
   std::set<MapId> results_requested_;  // maps whose earlier verification results were asked for
   AnchorRequests requests_;
   int64_t newest_anchor_utime_ = 0;
-  int64_t next_status_utime_ = 0;
 };
 
 }  // namespace pangea::viewer

@@ -19,7 +19,6 @@
 namespace pangea::vio {
 namespace {
 
-constexpr int64_t kStatusInterval_us = 1'000'000;
 constexpr int64_t kLagToldInterval_us = 10'000'000;
 constexpr int64_t kNotableLag_us = 500'000;
 
@@ -267,8 +266,7 @@ void VioProcess::Tick(int64_t now_utime) {
   if (!options_.told_options.empty()) {
     announcer_.Tick(now_utime);
   }
-  if (now_utime >= next_status_utime_) {
-    next_status_utime_ = now_utime + kStatusInterval_us;
+  if (node_.StatusIsDue(now_utime)) {
     node_.PublishStatus(now_utime, publisher_.Unacknowledged(), Summary());
   }
   TellLag(now_utime);

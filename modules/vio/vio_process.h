@@ -113,7 +113,6 @@ class VioProcess : public Process {
   MapLocalisation localization_;
   MapId shown_map_;
   OptionsAnnouncer announcer_;
-  int64_t next_status_utime_ = 0;
   std::optional<int64_t> first_image_utime_;
   std::string state_text_ = "waiting for images";
   std::string doubt_;             // a warning while tracking
