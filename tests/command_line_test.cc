@@ -185,7 +185,7 @@ TEST(Link, ItsTwoSidesDiffer) {
        {"pangea-link-emulator --agent 1 --bus x --agent-link u --server-link u",
         "pangea-uplink --agent 1 --key none --bus u --link u",
         "pangea-server --journal none --keys none --bus u --link u",
-        "pangea-agent-handler --journal none --keys none --server u --link u"}) {
+        "pangea-agent-handler --journal none --keys none --bus u --link u"}) {
     const Outcome outcome = RunCommand(fmt::format("timeout 10 {}", command));
     EXPECT_EQ(outcome.exit_code, 1) << command;
     EXPECT_THAT(outcome.output, HasSubstr("are both u: give two LCM URLs that differ")) << command;

@@ -135,7 +135,7 @@ class HostileDatagrams : public testing::Test {
       args[0] = bin + args[0];
       programs_.push_back(std::make_unique<Program>(std::move(args)));
     };
-    start({"pangea-agent-handler", "--link", link_, "--server", server_, "--journal",
+    start({"pangea-agent-handler", "--link", link_, "--bus", server_, "--journal",
            (folder_ / "journal.lcm").string(), "--keys", folder_.string()});
     start({"pangea-uplink", "--agent", "1", "--key", (folder_ / KeyFileName(kAgent)).string(),
            "--bus", agent_, "--link", link_});

@@ -72,7 +72,7 @@ class Session:
             subprocess.run([self.program("agent-handler"), "keygen", "--agent", str(agent["id"]), "--out",
                             self.out / "keys" / f"agent_{agent['id']}.key"], check=True, stdout=subprocess.DEVNULL)
         self.log_bus("server", "session")
-        self.start("server", "agent_handler", self.program("agent-handler"), "--link", LINK, "--server", OWN_BUS, "--journal",
+        self.start("server", "agent_handler", self.program("agent-handler"), "--link", LINK, "--bus", OWN_BUS, "--journal",
                    self.out / "journal.lcm", "--keys", self.out / "keys")
         for name in SERVER:
             self.start("server", name, self.program(name), "--bus", OWN_BUS)

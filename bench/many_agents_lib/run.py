@@ -100,7 +100,7 @@ class Run:
         self.prepare()
         try:
             self.log_bus("server", self.url(0))
-            self.start("handler", self.program("pangea-agent-handler"), "--link", self.url(1), "--server", self.url(0),
+            self.start("handler", self.program("pangea-agent-handler"), "--link", self.url(1), "--bus", self.url(0),
                        "--journal", self.work / "journal.lcm", "--keys", self.work / "keys")
             time.sleep(0.5)
             begin, waiting = time.time(), list(self.ids)

@@ -22,7 +22,7 @@ int main(int argc, char** argv) {
   std::string checkpoints;
   pangea::AgentHandlerOptions options;
   app.add_option("--link", link, "LCM URL of the link bus")->capture_default_str();
-  app.add_option("--server", server, "LCM URL of the server bus")->capture_default_str();
+  app.add_option("--bus,--server", server, "LCM URL of the server bus")->capture_default_str();
   app.add_option("--journal", journal, "LCM log to append to; an existing one is loaded");
   app.add_option("--keys", keys, "folder with the key of each agent that may join");
   app.add_option("--checkpoints", checkpoints,
@@ -47,7 +47,7 @@ int main(int argc, char** argv) {
     if (journal.empty() || keys.empty()) {
       throw std::runtime_error("give --journal FILE and --keys FOLDER (or: keygen --agent ID)");
     }
-    pangea::RequireTwoUrls("--link", link, "--server", server);
+    pangea::RequireTwoUrls("--link", link, "--bus", server);
     pangea::LcmBus link_bus(link, pangea::LcmBus::Fragments::kRefused);
     pangea::LcmBus server_bus(server);
     const auto remove_checkpoints = [&checkpoints] {

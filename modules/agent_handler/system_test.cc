@@ -140,8 +140,8 @@ class LinkedAgents {
   std::string KeyOf(int agent_id) const { return (keys_ / KeyFileName(agent_id)).string(); }
   std::unique_ptr<Program> StartHandler() const {
     return std::make_unique<Program>(
-        std::vector<std::string>{bin_ + "pangea-agent-handler", "--link", link_, "--server",
-                                 server_, "--journal", journal_, "--keys", keys_.string()});
+        std::vector<std::string>{bin_ + "pangea-agent-handler", "--link", link_, "--bus", server_,
+                                 "--journal", journal_, "--keys", keys_.string()});
   }
   std::unique_ptr<Program> StartUplink(int agent_id) const {
     return std::make_unique<Program>(std::vector<std::string>{

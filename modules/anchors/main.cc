@@ -24,7 +24,8 @@ int main(int argc, char** argv) {
     app.add_option("--allow-origin", origins,
                    "pages of this origin may use the API, as https://app.example; repeatable")
         ->needs(http_option);
-    app.add_option("--name", names, "a name of this machine by which apps may ask; repeatable")
+    app.add_option("--http-name,--name", names,
+                   "a name of this machine by which apps may ask; repeatable")
         ->needs(http_option);
   };
   const auto make = [&](pangea::Bus& bus) -> std::unique_ptr<pangea::Process> {

@@ -40,7 +40,7 @@ void Say(const std::string& line) {
 std::vector<std::string> Command(const std::string& process, const ServerSetup& options) {
   std::vector<std::string> argv{ProgramOf(process)};
   if (process == "agent_handler") {
-    argv.insert(argv.end(), {"--link", options.link, "--server", options.bus, "--journal",
+    argv.insert(argv.end(), {"--link", options.link, "--bus", options.bus, "--journal",
                              options.journal.string(), "--keys", options.keys.string(),
                              "--checkpoints", options.checkpoints.string()});
     if (!options.cluster.nats.empty()) {
@@ -55,7 +55,7 @@ std::vector<std::string> Command(const std::string& process, const ServerSetup& 
       argv.insert(argv.end(), {"--allow-origin", origin});
     }
     for (const std::string& name : options.names) {
-      argv.insert(argv.end(), {"--name", name});
+      argv.insert(argv.end(), {"--http-name", name});
     }
   }
   if (const auto file = options.options.find(process); file != options.options.end()) {

@@ -39,7 +39,7 @@ int main(int argc, char** argv) {
   app.add_option("--listen", options.listen,
                  "address to listen on; 0.0.0.0 lets everybody on the network look")
       ->capture_default_str();
-  app.add_option("--name", options.names,
+  app.add_option("--http-name,--name", options.names,
                  "a name of this machine by which browsers may ask for the page");
   app.add_flag("--read-only", read_only, "pages show anchors, and cannot change them");
   app.add_option("--page", page, "folder of the built page")->capture_default_str();

@@ -52,7 +52,7 @@ void SessionProcesses::StartLogger(const std::string& name, const std::string& u
 void SessionProcesses::StartServer(const SessionServerOptions& options, const fs::path& journal) {
   StartLogger("logger_server", buses_.server, folder_ / "session.lcm");
   kept_.Start("agent_handler",
-              {SiblingProgram("pangea-agent-handler"), "--link", buses_.link, "--server",
+              {SiblingProgram("pangea-agent-handler"), "--link", buses_.link, "--bus",
                buses_.server, "--journal", journal.string(), "--keys", (folder_ / "keys").string(),
                "--options", WriteOptions("agent_handler", options.agent_handler)});
   const std::map<std::string, std::string> texts = TextsByProcess(options);

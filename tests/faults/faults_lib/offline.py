@@ -64,7 +64,7 @@ class Link:
         return self.call("pangea-keyframe-player", "--agent", str(self.agent), "--bus", self.bus, "--keyframes", str(log))
 
     def handler(self):
-        return self.call("pangea-agent-handler", "--link", self.link, "--server", self.server, "--keys",
+        return self.call("pangea-agent-handler", "--link", self.link, "--bus", self.server, "--keys",
                          str(self.key.parent), "--journal", str(self.folder / "journal.lcm"))
 
     def stop(self):
