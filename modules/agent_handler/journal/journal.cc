@@ -58,6 +58,11 @@ Journal::Journal(const std::string& path, const Visitor& visitor,
       throw std::runtime_error(fmt::format("the journal '{}' is in use by another process", path));
     }
     Load(visitor, before_mend);
+    // A run that was killed may not have waited for the disk.
+    if (synced_bytes_ > 0 && fdatasync(fd_) != 0) {
+      throw std::runtime_error(fmt::format("the journal '{}' cannot be brought to the disk: {}",
+                                           path, std::strerror(errno)));
+    }
   } catch (...) {
     close(fd_);
     throw;

@@ -10,12 +10,12 @@
 // After each synced group there is a CHECKSUMS event (checksums.h) for the group and the kRepeated
 // events before it, so that one CHECKSUMS event may be lost. All events are numbered together.
 //
-// When a journal is opened, it is read to its end, past any damage: bytes that are no event, events
-// with a wrong checksum, and events whose content is damaged. The damaged parts, and a tail torn by
-// a crash, are first copied to a file beside the journal (damaged_copy.h). Then the tail is cut
-// off, and damaged parts become DAMAGED events of the same size. So every LCM tool can read the
-// journal to its end, and all other events stay in place. A file that is not a log is refused and
-// not changed.
+// When a journal is opened, it is brought to the disk and read to its end, past any damage: bytes
+// that are no event, events with a wrong checksum, and events whose content is damaged. The damaged
+// parts, and a tail torn by a crash, are first copied to a file beside the journal
+// (damaged_copy.h). Then the tail is cut off, and damaged parts become DAMAGED events of the same
+// size. So every LCM tool can read the journal to its end, and all other events stay in place. A
+// file that is not a log is refused and not changed.
 
 #include <cstdint>
 #include <deque>
