@@ -56,7 +56,11 @@ struct OpenFile {
 void Check(const fs::path& file, int fd) {
   struct stat info {};
   if (fd < 0 || fstat(fd, &info) != 0) {
-    Fail(file, fmt::format("{}; make one with pangea-agent-handler keygen", std::strerror(errno)));
+    const char* const advice = errno == EACCES
+                                   ? ": give it to the user that runs this program (chown)"
+                               : errno == ENOENT ? "; make one with pangea-agent-handler keygen"
+                                                 : "";
+    Fail(file, fmt::format("{}{}", std::strerror(errno), advice));
   }
   if (!S_ISREG(info.st_mode)) {
     Fail(file, "is not a file");

@@ -76,6 +76,13 @@ TEST_F(AgentKeyTest, MistakesGetAnAnswerWithoutTheSecret) {
   EXPECT_THAT(ReasonOf([&] { ReadKeyFile(Write("long.key", std::string(5000, '#'))); }),
               HasSubstr("too long"));
   EXPECT_THAT(ReasonOf([&] { ReadKeyFile(folder); }), HasSubstr("is not a file"));
+  const uid_t user = geteuid();
+  fs::permissions(open, fs::perms::none);
+  ASSERT_TRUE(user != 0 || seteuid(65534) == 0) << "root may read everything";
+  const std::string denied = ReasonOf([&] { ReadKeyFile(open); });
+  ASSERT_EQ(seteuid(user), 0);
+  EXPECT_THAT(denied, testing::AllOf(HasSubstr("denied: give it to the user"),
+                                     testing::Not(HasSubstr("keygen"))));
   const std::string secret(63, 'b');
   EXPECT_THAT(ReasonOf([&] { ReadKeyFile(Write("bad.key", "agent: 4\nkey: " + secret + "\n")); }),
               testing::Not(HasSubstr("bbbb")));
