@@ -57,6 +57,11 @@ bool Sender::Add(const KeyframeId& id, std::vector<uint8_t> bytes) {
   return true;
 }
 
+Bytes Sender::InMemory(const KeyframeId& id) const {
+  const auto item = spool_.find(id);
+  return item == spool_.end() ? Bytes() : Bytes(item->second.bytes);
+}
+
 void Sender::SetStored(const KeyframeId& id) {
   Item& item = FindOrAdd(id);
   item.stored = true;

@@ -54,6 +54,8 @@ class Sender {
   // Adds a compressed keyframe. False if the memory is full.
   bool Add(const KeyframeId& id, std::vector<uint8_t> bytes);
   bool Has(const KeyframeId& id) const { return spool_.contains(id); }
+  // The keyframe, compressed, if it is in memory; else empty.
+  Bytes InMemory(const KeyframeId& id) const;
   // From now on the keyframe can be loaded with `load`; also used for those of an earlier run.
   void SetStored(const KeyframeId& id);
   // FirstSeqFrom: the first spooled keyframe of the map at or after `seq`. FirstMissingFrom: the

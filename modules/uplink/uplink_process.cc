@@ -20,6 +20,7 @@ namespace pangea {
 namespace {
 
 constexpr int64_t kHaveInterval_us = 400'000;
+constexpr int kStoredAtOnce = 50;  // keyframes that the disk refused before
 constexpr int kBusy_ms = 4;
 constexpr int kIdle_ms = 20;
 
@@ -110,14 +111,37 @@ void UplinkProcess::OnKeyframe(Bytes data) {
       if (ladder_) {
         ladder_->Charge(compressed_bytes);
       }
-      if (spool_ != nullptr && spool_->Add(keyframe.value->id, bytes, now_utime_)) {
-        uplink_.SetStored(keyframe.value->id);
+      if (spool_ != nullptr) {
+        Store(keyframe.value->id, bytes);
       }
       return node_.Count("keyframes");
     case Uplink::Taken::kRepeat:
       return node_.Count("keyframes_repeated");
     case Uplink::Taken::kSpoolFull:
       return node_.Count("keyframes_spool_full");
+  }
+}
+
+bool UplinkProcess::Store(const KeyframeId& id, Bytes bytes) {
+  if (!spool_->Add(id, bytes, now_utime_)) {
+    unstored_.insert(id);
+    return false;
+  }
+  uplink_.SetStored(id);
+  unstored_.erase(id);
+  return true;
+}
+
+void UplinkProcess::StoreLeft() {
+  bool stored = true;
+  for (int i = 0; i < kStoredAtOnce && stored && !unstored_.empty(); ++i) {
+    const KeyframeId id = *unstored_.begin();
+    const Bytes compressed = uplink_.sender().InMemory(id);
+    if (compressed.empty()) {
+      unstored_.erase(id);  // it was acknowledged meanwhile
+    } else {
+      stored = Store(id, *Decompress(compressed, kMaxKeyframeBytes));
+    }
   }
 }
 
@@ -337,6 +361,7 @@ void UplinkProcess::Tick(int64_t now_utime) {
   node_.Set("anchor_edits_waiting", edits_waiting);
   node_.Set("spool_memory_bytes", sender.spooled_bytes());
   if (spool_ != nullptr) {
+    StoreLeft();
     spool_->Sync();
     node_.Set("spool_disk_bytes", spool_->bytes());
     node_.Set("spool_damaged", spool_->num_damaged());

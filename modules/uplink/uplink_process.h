@@ -6,6 +6,7 @@
 //   link bus:  LINK_DOWN_k in, LINK_UP_k out
 
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -42,6 +43,9 @@ class UplinkProcess : public PolledProcess {
   void OnOthers(const LinkPacket& packet);
   // Returns the packet's bytes on the wire.
   int64_t Send(const LinkPacket& packet);
+  // Stores the keyframe on disk. False if the disk refuses; then StoreLeft tries again.
+  bool Store(const KeyframeId& id, Bytes bytes);
+  void StoreLeft();
   std::vector<uint8_t> Load(const KeyframeId& id);
   void PublishHave();
   void PublishAsks();
@@ -56,6 +60,7 @@ class UplinkProcess : public PolledProcess {
   UplinkSession session_;
   MapContinuity continuity_;
   Spool* const spool_;
+  std::set<KeyframeId> unstored_;  // those that the disk refused
   Uplink uplink_;
   UplinkAnchors anchors_;
   std::optional<RateLadder> ladder_;

@@ -1,8 +1,11 @@
 #include "uplink/uplink_process.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <algorithm>
+#include <csignal>
 #include <filesystem>
 #include <string>
 
@@ -58,6 +61,39 @@ TEST(UplinkProcess, TellsWhatWasSentAndWhatIsLeft) {
   EXPECT_EQ(lost.Totals(),
             "0.0 kB sent; keyframes: 0 acknowledged, 1 lost: --spool FOLDER keeps them for the "
             "next start");
+}
+
+// Else they would be lost with the uplink, hours after the disk was all right again.
+TEST(UplinkProcess, KeyframesThatTheDiskRefusedAreStoredLater) {
+  const std::filesystem::path folder =
+      std::filesystem::path(testing::TempDir()) / "uplink_process_spool";
+  std::filesystem::remove_all(folder);
+  const MapId map{1, 1000};
+  std::signal(SIGXFSZ, SIG_IGN);
+  rlimit limit{};
+  getrlimit(RLIMIT_FSIZE, &limit);
+  const rlimit full{1000, limit.rlim_max};
+  {
+    LocalBus agent_bus, link_bus;
+    Spool spool(folder, 1, 1 << 30);
+    UplinkProcess uplink(agent_bus, link_bus, 1, SecretKey::Random(), UplinkOptions{}, &spool);
+    const auto run = [&](int64_t utime) {
+      agent_bus.Drain();
+      uplink.Poll(utime);
+      uplink.Tick(utime);
+    };
+    setrlimit(RLIMIT_FSIZE, &full);
+    agent_bus.Publish(channels::Keyframe(1), EncodeTestKeyframe({map, 0}));
+    agent_bus.Publish(channels::Keyframe(1), EncodeTestKeyframe({map, 1}));
+    run(1'000'000);
+    EXPECT_TRUE(spool.Kept().empty());
+    setrlimit(RLIMIT_FSIZE, &limit);
+    run(2'500'000);
+  }
+  Spool spool(folder, 1, 1 << 30);
+  EXPECT_THAT(spool.Kept(), testing::ElementsAre(KeyframeId{map, 0}, KeyframeId{map, 1}));
+  EXPECT_EQ(spool.Read({map, 1}), EncodeTestKeyframe({map, 1}));
+  std::filesystem::remove_all(folder);
 }
 
 }  // namespace
