@@ -78,18 +78,24 @@ std::optional<AnchorEdit> EditSpool::Read(const fs::path& file) const {
     return std::nullopt;
   }
   std::optional<AnchorEdit> edit;
+  bool is_ours = true;
   try {
     CheckedScan scan(fd);
     const CheckedScan::Piece* const piece = scan.Next();
     anchor_edit_t message{};
-    if (piece != nullptr && piece->kind == LogPiece::Kind::kEvent && piece->channel == channel_ &&
+    if (piece != nullptr && piece->kind == LogPiece::Kind::kEvent &&
         DecodeMessage(piece->data, &message)) {
       edit = Parse(message).value;
+      is_ours = piece->channel == channel_;
     }
   } catch (const std::runtime_error&) {
     // The disk cannot read it: it counts as damaged.
   }
   close(fd);
+  if (!is_ours) {
+    throw std::runtime_error(fmt::format(
+        "'{}' is an edit of another agent: give each uplink its own --spool", file.string()));
+  }
   return edit;
 }
 

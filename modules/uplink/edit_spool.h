@@ -25,7 +25,8 @@ class EditSpool {
   // `folder`: the folder of the Spool, which exists and which this process has locked.
   EditSpool(std::filesystem::path folder, int32_t agent_id);
 
-  // The edits of an earlier run, in the order of their anchors. Call it once, at the start.
+  // The edits of an earlier run, in the order of their anchors. Call it once, at the start. Throws
+  // std::runtime_error if there is one of another agent.
   std::vector<AnchorEdit> TakeLeft();
   // Keeps the edit in place of an older one of the anchor. On an error, refuses() becomes true.
   void Put(const AnchorEdit& edit);

@@ -85,6 +85,12 @@ TEST_F(EditSpoolTest, WhatAKilledRunLeftIsRemoved) {
   EXPECT_EQ(std::distance(fs::directory_iterator(folder), fs::directory_iterator()), 2);
 }
 
+TEST_F(EditSpoolTest, AnotherAgentsIsRefusedAndStays) {
+  EditSpool(folder, 1).Put(TestEdit(kA, 1, 1));
+  EXPECT_THROW(EditSpool(folder, 2).TakeLeft(), std::runtime_error);
+  EXPECT_EQ(Left(), (Revisions{{kA, 1}}));
+}
+
 TEST_F(EditSpoolTest, AFullDiskLeavesTheOneBefore) {
   EditSpool spool(folder, 1);
   spool.Put(TestEdit(kA, 1, 1));
