@@ -34,6 +34,14 @@ void CheckKind(const std::string& path, int fd) {
   }
 }
 
+// Whether the path still names the open file.
+bool Names(const std::string& path, int fd) {
+  struct stat opened {
+  }, named{};
+  return fstat(fd, &opened) == 0 && stat(path.c_str(), &named) == 0 &&
+         opened.st_ino == named.st_ino && opened.st_dev == named.st_dev;
+}
+
 int64_t SizeOf(const std::vector<DamagedPart>& parts) {
   int64_t size = 0;
   for (const DamagedPart& part : parts) {
@@ -56,6 +64,10 @@ Journal::Journal(const std::string& path, const Visitor& visitor,
     CheckKind(path, fd_);
     if (flock(fd_, LOCK_EX | LOCK_NB) != 0) {
       throw std::runtime_error(fmt::format("the journal '{}' is in use by another process", path));
+    }
+    if (!Names(path, fd_)) {
+      throw std::runtime_error(
+          fmt::format("the journal '{}' was replaced just now: start again", path));
     }
     Load(visitor, before_mend);
     // A run that was killed may not have waited for the disk.

@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
-#include <sys/syscall.h>
 #include <unistd.h>
 
 #include <csignal>
@@ -13,18 +12,6 @@
 
 #include "bus/retransmission/journal_reader.h"
 #include "log_file/log_event.h"
-
-namespace {
-
-int num_syncs = 0;
-
-}  // namespace
-
-// Replaces the C library's function in this program.
-extern "C" int fdatasync(int fd) {
-  ++num_syncs;
-  return static_cast<int>(syscall(SYS_fdatasync, fd));
-}
 
 namespace pangea {
 namespace {
@@ -334,14 +321,6 @@ TEST_F(JournalTest, DamageTooSmallForAnEventBecomesZeros) {
   EXPECT_EQ(seen.size(), 2u);
   EXPECT_EQ(Open()->mend().copy, "");
   EXPECT_EQ(seen.size(), 2u);
-}
-
-// A run that was killed may have written them, and not waited for the disk.
-TEST_F(JournalTest, WhatItFindsIsBroughtToTheDisk) {
-  Write(3);
-  num_syncs = 0;
-  Open();
-  EXPECT_EQ(num_syncs, 1);
 }
 
 TEST_F(JournalTest, EventNumbersGoOnAfterItWasOpenedAgain) {
