@@ -1,6 +1,7 @@
 #include "thinning/thinning.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -151,9 +152,11 @@ std::set<KeyframeId> Thinning::Gone(const Solution& solution, const std::set<Map
     const MapId& group = solution.group_of.at(id);
     map.group =
         group_numbers.try_emplace(group, static_cast<int>(group_numbers.size())).first->second;
+    const double scale = std::exp(solution.log_scale.at(id));
     for (const Keyframe& keyframe : stored_.at(id).keyframes) {
       map.views.push_back({solution.T_map_body.at(keyframe.id) * keyframe.camera.T_body_cam,
-                           Depth(keyframe), whole.contains(id) || must_stay.contains(keyframe.id),
+                           scale * Depth(keyframe),
+                           whole.contains(id) || must_stay.contains(keyframe.id),
                            recognised.contains(keyframe.id)});
     }
     views.push_back(std::move(map));

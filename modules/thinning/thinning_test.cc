@@ -212,6 +212,19 @@ TEST_F(ThinningTest, DerivedConstraintsHaveTheUnitsOfTheirMap) {
   EXPECT_EQ(states[0].num_switched_off, 0);
 }
 
+// The poses are metric, and so must be the depths that say how near two views are.
+TEST_F(ThinningTest, WhatStaysDoesNotDependOnTheUnitsOfAMap) {
+  constexpr double kLogScale = 0.7;
+  const auto metric = static_cast<double>(MakeThinning().Thin(kNow).gone.size());
+  for (size_t visit = 1; visit < world_.agents.size(); ++visit) {
+    Unscale(kLogScale, 0.7, &world_.agents[visit]);
+    Unscale(kLogScale, world_.agents[visit].map, &constraints_);
+  }
+  const ThinnedMaps thinned = MakeThinning().Thin(kNow);
+  ASSERT_EQ(States(thinned).size(), 1u);
+  EXPECT_NEAR(static_cast<double>(thinned.gone.size()) / metric, 1, 0.1);
+}
+
 TEST_F(ThinningTest, AKeyframeGetsOnlySoManyDerivedConstraints) {
   ThinningOptions options;
   options.max_derived = 2;

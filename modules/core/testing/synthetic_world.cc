@@ -323,6 +323,10 @@ void Unscale(double log_scale, double sigma, SyntheticAgent* agent) {
   for (Keyframe& keyframe : agent->keyframes) {
     keyframe.T_odom_body.t *= longer;
     keyframe.scale_sigma = sigma;
+    for (MapPoint& point : keyframe.points) {
+      point.inverse_depth /= static_cast<float>(longer);
+      point.inverse_depth_var /= static_cast<float>(longer * longer);
+    }
     if (keyframe.edge) {
       keyframe.edge->T_from_this.t *= longer;
       keyframe.edge->covariance.topRows<3>() *= longer;
