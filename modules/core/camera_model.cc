@@ -143,6 +143,10 @@ bool CameraModel::Contains(const Vector2d& pixel, double border) const {
          pixel.y() <= height - 1 - border;
 }
 
+double CameraModel::RowTime_s(double row) const {
+  return height > 1 ? readout_s * row / (height - 1) : 0;
+}
+
 std::optional<std::string> CameraModel::Invalid() const {
   if (width < 16 || height < 16 || width > 2047 || height > 2047) {
     return "image size must be 16 to 2047 pixels";

@@ -42,6 +42,8 @@ struct CameraModel {
 
   // Whether the pixel is inside the image and at least `border` pixels from its edge.
   bool Contains(const Eigen::Vector2d& pixel, double border = 0) const;
+  // Seconds from the exposure of the first row to that of `row`; 0 for a global shutter.
+  double RowTime_s(double row) const;
   // The angle of one pixel at the image centre, radians.
   double PixelAngle() const { return 2.0 / (fx + fy); }
   // The reason why the model is invalid; nothing when it is valid.

@@ -77,6 +77,15 @@ TEST(CameraModel, FoldedDistortionIsRefused) {
   EXPECT_FALSE(camera.Project({3.0, 0.0, 1.0}).has_value());
 }
 
+TEST(CameraModel, TheLastRowIsExposedTheReadoutAfterTheFirst) {
+  CameraModel camera = EurocTestCamera();
+  EXPECT_EQ(camera.RowTime_s(240), 0) << "a global shutter";
+  camera.readout_s = 0.03;
+  EXPECT_EQ(camera.RowTime_s(0), 0);
+  EXPECT_DOUBLE_EQ(camera.RowTime_s(camera.height - 1), 0.03);
+  EXPECT_DOUBLE_EQ(camera.RowTime_s(0.5 * (camera.height - 1)), 0.015);
+}
+
 TEST(CameraModel, SaysWhatIsWrong) {
   CameraModel camera = EurocTestCamera();
   EXPECT_FALSE(camera.Invalid().has_value());

@@ -178,13 +178,12 @@ Rigid3 Recorder::CameraPose(int64_t stamp_ns, double row_delay_s) const {
 }
 
 std::vector<Rigid3> Recorder::RowPoses(int64_t stamp_ns) const {
-  const double readout = options_.camera.readout_s;
-  if (readout == 0) {
+  if (options_.camera.readout_s == 0) {
     return {CameraPose(stamp_ns, 0)};
   }
   std::vector<Rigid3> poses;
   for (int y = 0; y < options_.camera.height; ++y) {
-    poses.push_back(CameraPose(stamp_ns, readout * y / (options_.camera.height - 1)));
+    poses.push_back(CameraPose(stamp_ns, options_.camera.RowTime_s(y)));
   }
   return poses;
 }

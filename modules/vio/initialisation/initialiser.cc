@@ -81,10 +81,10 @@ double MeanMagnitude(const std::vector<ImuSample>& samples, Vector3d ImuSample::
 // rotation during the read-out is several pixels at the last row.
 Vector2d RayOfFirstRow(const Observation& seen, const CameraModel& camera,
                        const BodyMotion& motion) {
-  if (camera.readout_s <= 0 || camera.height < 2) {
+  if (camera.readout_s <= 0) {
     return seen.ray;
   }
-  const double row_s = camera.readout_s * static_cast<double>(seen.pixel.y()) / (camera.height - 1);
+  const double row_s = camera.RowTime_s(static_cast<double>(seen.pixel.y()));
   const Eigen::Quaterniond& q_body_cam = camera.T_body_cam.q;
   const Vector3d ray =
       q_body_cam.conjugate() * (motion.After(row_s).q * (q_body_cam * seen.ray.homogeneous()));

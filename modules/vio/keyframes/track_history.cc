@@ -61,13 +61,12 @@ void ForShared(const SeenLandmarks& a, const SeenLandmarks& b, const Use& use) {
 void TrackHistory::AddFrame(const TrackedFrame& frame, const CameraModel& camera,
                             double ray_sigma) {
   SeenLandmarks& seen = frames_[frame.utime];
-  const double row_s = camera.height > 1 ? camera.readout_s / (camera.height - 1) : 0;
   seen.reserve(frame.observations.size());
   for (const Observation& observation : frame.observations) {
-    seen.push_back(
-        {observation.landmark_id,
-         {-1, observation.ray, ray_sigma * observation.sigma_px,
-          row_s * static_cast<double>(observation.pixel.y()), ByIntrinsics(observation, camera)}});
+    seen.push_back({observation.landmark_id,
+                    {-1, observation.ray, ray_sigma * observation.sigma_px,
+                     camera.RowTime_s(static_cast<double>(observation.pixel.y())),
+                     ByIntrinsics(observation, camera)}});
   }
   std::sort(seen.begin(), seen.end(), HasSmallerId);
 }

@@ -15,8 +15,7 @@ using Eigen::Vector3d;
 
 // Pose of the camera at the exposure of a row, relative to the camera at the image's time.
 Rigid3 RowCamera(const CameraModel& camera, const BodyMotion& motion, double row) {
-  const double s = camera.readout_s * row / (camera.height - 1);
-  return camera.T_body_cam.Inverse() * motion.After(s) * camera.T_body_cam;
+  return camera.T_body_cam.Inverse() * motion.After(camera.RowTime_s(row)) * camera.T_body_cam;
 }
 
 struct SeenDepth {
@@ -57,7 +56,7 @@ double InverseDepthNear(const Eigen::Vector2f& pixel, const std::vector<SeenDept
 
 void CompensateRollingShutter(const BodyMotion& motion, Keyframe& keyframe) {
   const CameraModel& camera = keyframe.camera;
-  if (camera.readout_s <= 0 || camera.height < 2) {
+  if (camera.readout_s <= 0) {
     return;
   }
   std::vector<MapPoint*> point_of(keyframe.corners.size(), nullptr);

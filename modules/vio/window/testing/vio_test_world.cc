@@ -158,7 +158,7 @@ std::optional<Vector2d> VioTestWorld::Seen(const Vector3d& point, double t) cons
   constexpr int kIterations = 3;  // each leaves some 3 % of the error
   auto pixel = SeenFrom(PoseAt(t) * true_T_body_cam_, point);
   for (int i = 0; pixel && options_.readout_s > 0 && i < kIterations; ++i) {
-    const double row_s = options_.readout_s * pixel->y() / (camera_.height - 1);
+    const double row_s = camera_.RowTime_s(pixel->y());
     pixel = SeenFrom(PoseAt(t + row_s) * true_T_body_cam_, point);
   }
   return pixel;
