@@ -115,12 +115,23 @@ InitialResult Initialiser::AddFrame(const TrackedFrame& frame, std::span<const I
   while (SpanSeconds(frames_.front().utime, frame.utime) > kMaxSpan_s) {
     frames_.erase(frames_.begin());
   }
+  DropImagesBeforeSamples();
+  if (frames_.empty()) {
+    return {std::nullopt, "no inertial samples from before the image"};
+  }
   std::erase_if(samples_, [&](const ImuSample& sample) {
     return SpanSeconds(sample.utime, frames_.front().utime) > kSampleMargin_s;
   });
   InitialResult result = Try();
   why_not_ = result.reason;
   return result;
+}
+
+// The motion from such an image to the next one is not known.
+void Initialiser::DropImagesBeforeSamples() {
+  std::erase_if(frames_, [&](const TrackedFrame& frame) {
+    return SpanSeconds(frame.utime, samples_.front().utime) > time_offset_change_s_;
+  });
 }
 
 InitialResult Initialiser::Try() {
@@ -211,6 +222,7 @@ InitialResult Initialiser::TryMoving() {
     return result;
   }
   time_offset_change_s_ += *offset;
+  DropImagesBeforeSamples();
   return TryMoving(StartFrames());
 }
 

@@ -28,16 +28,16 @@ namespace pangea::vio {
 struct InitialState {
   // The frames used for the start, oldest first; only one for a stationary start.
   struct Frame {
-    TrackedFrame tracked;      // its utime is on the IMU's clock
-    ImuState imu;              // at this time
+    TrackedFrame tracked;  // its utime is on the IMU's clock
+    ImuState imu;
     double stamp_error_s = 0;  // of this image alone
   };
   std::vector<Frame> frames;
   bool stationary = false;
   // Only for a stationary start: (dtheta left, dp, dv, gyro bias, accel bias), in odom.
   Eigen::Matrix<double, 15, 15> covariance = Eigen::Matrix<double, 15, 15>::Identity();
-  // The frames' utime is later than the one given to AddFrame by time_offset_change_s; the images
-  // were taken later still, by time_offset_error_s.
+  // The frames' states are later than their utime by time_offset_change_s; the images were taken
+  // later still, by time_offset_error_s.
   double time_offset_change_s = 0;
   double time_offset_error_s = 0;
 };
@@ -60,6 +60,7 @@ class Initialiser {
                          double stamp_sigma_s);
 
  private:
+  void DropImagesBeforeSamples();
   InitialResult Try();
   std::optional<InitialState> TryStationary() const;
   InitialResult TryMoving();

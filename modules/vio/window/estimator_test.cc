@@ -185,6 +185,26 @@ TEST(Estimator, AGapInTheSamplesOfAShakenHandCostsLittle) {
   }
 }
 
+// A phone's camera starts before its IMU, or the offset between the clocks puts the first images of
+// a recording before its first sample. The motion between such images is not known.
+TEST(Estimator, StartsWithImagesFromBeforeTheFirstSample) {
+  for (const int64_t late_us : {40'000, 450'000}) {
+    for (uint64_t seed = 1; seed <= 5; ++seed) {
+      VioTestWorldOptions options;
+      options.seed = seed;
+      Ride ride(options);
+      AdvanceWithGap(&ride, 45, 0, 1'000'000 + late_us);
+      ASSERT_FALSE(ride.tracked.empty()) << ride.last.reason;
+      EXPECT_LE(ride.started_s, 2.5 + 1e-6 * static_cast<double>(late_us));
+      const Ride::Frame &first = ride.tracked.front(), &last = ride.tracked.back();
+      const double true_length = (last.truth.T_odom_body.t - first.truth.T_odom_body.t).norm();
+      const double length = (last.result.T_odom_body.t - first.result.T_odom_body.t).norm();
+      EXPECT_LT(TiltError(first.truth, first.result), 0.035);
+      EXPECT_NEAR(length / true_length, 1, 0.05) << "seed " << seed;
+    }
+  }
+}
+
 TEST(Estimator, FollowsThePathForHalfAMinute) {
   VioTestWorldOptions options;
   options.seed = 3;
