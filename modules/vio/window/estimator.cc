@@ -328,7 +328,7 @@ std::optional<std::string> Estimator::Impl::Implausible() const {
 
 std::optional<std::string> Estimator::Impl::TryStart(const TrackedFrame& frame,
                                                      std::span<const ImuSample> imu) {
-  imu_samples.Forget(frame.utime - kStartSpan_us);
+  imu_samples.Forget(ImuTime(frame.utime) - kStartSpan_us);
   TrackedFrame shifted = frame;  // the initialiser works on the IMU's clock
   shifted.utime = ImuTime(frame.utime);
   const InitialResult initial = initialiser.AddFrame(shifted, imu, stamps.sigma_s());

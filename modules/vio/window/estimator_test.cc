@@ -205,6 +205,28 @@ TEST(Estimator, StartsWithImagesFromBeforeTheFirstSample) {
   }
 }
 
+// The offset between the clocks of camera and IMU may be seconds (CameraModel::Invalid).
+TEST(Estimator, StartsWithClocksThatDifferBySeconds) {
+  Ride ride({});
+  VioTestWorld world({});
+  CameraModel camera = world.camera();
+  camera.time_offset_s = -5;
+  EstimatorOptions options;
+  options.calibration.distortion = 0.0003;
+  Estimator estimator(options, camera, world.options().imu_noise);
+  FrameResult last;
+  for (int i = 0; i < 45; ++i) {
+    ride.Advance(1);
+    VioTestWorld::Input input = world.Next();
+    input.frame.utime += 5'000'000;
+    last = estimator.AddFrame(input.frame, input.imu);
+    world.Drop(last.outlier_landmarks);
+  }
+  ASSERT_EQ(ride.last.state, EstimatorState::kTracking) << ride.last.reason;
+  ASSERT_EQ(last.state, EstimatorState::kTracking) << last.reason;
+  EXPECT_LT(last.T_odom_body.Minus(ride.last.T_odom_body).norm(), 1e-6);
+}
+
 TEST(Estimator, FollowsThePathForHalfAMinute) {
   VioTestWorldOptions options;
   options.seed = 3;
