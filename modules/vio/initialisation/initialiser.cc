@@ -161,6 +161,10 @@ std::optional<InitialState> Initialiser::TryStationary() const {
   const auto oldest = std::find_if(frames_.begin(), frames_.end(), [now](const TrackedFrame& one) {
     return SpanSeconds(one.utime, now) <= kStationarySpan_s + kFrameSpacing_s;
   });
+  // Behind a gap in the images, the newest of them may span much less.
+  if (SpanSeconds(oldest->utime, now) < kStationarySpan_s - kFrameSpacing_s) {
+    return std::nullopt;
+  }
   const std::vector<ImuSample> samples = SamplesBetween(samples_, oldest->utime, now);
   size_t shared = 0;
   const double moved = MedianDisplacement(*oldest, frames_.back(), &shared);

@@ -170,6 +170,30 @@ TEST(Estimator, AGapInTheInertialSamplesIsALoss) {
   EXPECT_THAT(ride.last.reason, HasSubstr("inertial samples have a gap"));
 }
 
+// After a gap in the images, a tenth of a second without motion says nothing: the gyroscope's mean
+// rate would be taken for its bias.
+TEST(Estimator, AStationaryStartTakesASecondOfImages) {
+  const VioTestWorld world({});
+  const double rate_radps = 0.012, focal_px = world.camera().fx;
+  Estimator estimator(EstimatorOptions{}, world.camera(), ImuNoise{});
+  int64_t next_imu_utime = 0;
+  for (const int64_t utime : {0, 1'000'000, 1'100'000, 1'200'000, 1'300'000}) {
+    const double t_s = 1e-6 * static_cast<double>(utime);
+    TrackedFrame frame{utime, {}};
+    for (int32_t id = 0; id < 80; ++id) {
+      const Eigen::Vector2d pixel(60 + 50 * (id % 10) - focal_px * rate_radps * t_s,
+                                  60 + 50 * (id / 10));
+      frame.observations.push_back(
+          {id, pixel.cast<float>(), *world.camera().Unproject(pixel), 0.5});
+    }
+    std::vector<ImuSample> imu;
+    for (; imu.empty() || imu.back().utime < utime; next_imu_utime += 5'000) {
+      imu.push_back({next_imu_utime, Vector3d(0, 0, rate_radps), Vector3d(0, 0, kGravity)});
+    }
+    EXPECT_EQ(estimator.AddFrame(frame, imu).state, EstimatorState::kInitialising) << utime;
+  }
+}
+
 TEST(Estimator, NoInertialSamplesAreALoss) {
   Ride ride({});
   ride.Advance(50);
