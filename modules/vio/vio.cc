@@ -27,11 +27,12 @@ Vio::Vio(int32_t agent_id, const CameraModel& camera, const ImuNoise& noise,
 }
 
 void Vio::OpenNewMap() {
-  // A map from which no keyframe was output keeps its id.
-  if (maps_opened_ == 0 || next_seq_ > 0) {
+  // A map without a pose keeps its id.
+  if (maps_opened_ == 0 || map_has_poses_) {
     map_ = {agent_id_, open_map_()};
     ++maps_opened_;
   }
+  map_has_poses_ = false;
   next_seq_ = 0;
   group_revision_ = 0;
   scale_sigma_.reset();
@@ -109,6 +110,7 @@ VioOutput Vio::Estimate(const TrackedFrame& frame, const cv::Mat& image,
     described_[frame.utime] = describer_.Describe(image, frame);
   }
   if (result.state == EstimatorState::kTracking) {
+    map_has_poses_ = true;
     gyro_bias_ = result.gyro_bias;
   }
   tracker_.Drop(result.outlier_landmarks);

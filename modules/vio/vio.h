@@ -106,6 +106,7 @@ class Vio {
   Describer describer_;
   std::optional<Estimator> estimator_;
   MapId map_;
+  bool map_has_poses_ = false;
   int maps_opened_ = 0;
   int32_t next_seq_ = 0;
   int64_t group_revision_ = 0;

@@ -317,6 +317,41 @@ TEST_F(VioProcessTest, ALostOdometryOpensANewMap) {
   EXPECT_GT(expected, 3);
 }
 
+// Poses of two odom frames must not have one map's id, nor be in one file.
+TEST_F(VioProcessTest, AMapThatIsLostBeforeItsFirstKeyframeEndsToo) {
+  options_.out_tum = ::testing::TempDir() + "vio_process_lost_early.tum";
+  VioProcess process(bus_, options_, 0);
+  process.Open(world_.camera(), ImuNoise{});
+  Play(process, 0, 3);
+  ASSERT_EQ(poses_.back().state, pose_t::STATE_TRACKING) << poses_.back().reason;
+  const cv::Mat image = RandomTexture(752, 480, 11);
+  for (int64_t utime = 3'000'000; utime < 3'300'000; utime += kImageStep_us) {  // it is thrown
+    std::vector<ImuSample> imu;
+    for (; next_imu_ <= utime; next_imu_ += kImuStep_us) {
+      imu.push_back({next_imu_, Eigen::Vector3d::Zero(), Eigen::Vector3d(400, 0, 0)});
+    }
+    process.AddTracks({utime, {}}, image, imu);
+  }
+  bus_.Drain();
+  ASSERT_TRUE(keyframes_.empty());
+  const size_t before = poses_.size();
+  Play(process, 3.3, 7);
+  ASSERT_EQ(poses_.back().state, pose_t::STATE_TRACKING) << poses_.back().reason;
+  int64_t lost = 0, of_first = 0;
+  for (size_t i = 0; i < poses_.size(); ++i) {
+    const bool tracking = poses_[i].state == pose_t::STATE_TRACKING;
+    lost += poses_[i].state == pose_t::STATE_LOST ? 1 : 0;
+    of_first += tracking && i < before ? 1 : 0;
+    if (tracking) {
+      EXPECT_EQ(poses_[i].map.opened_utime, kMapUtime + (i < before ? 0 : 1)) << i;
+    }
+  }
+  EXPECT_EQ(lost, 1);
+  std::vector<std::string> warnings;
+  EXPECT_EQ(static_cast<int64_t>(ReadTum(options_.out_tum, &warnings).size()), of_first);
+  EXPECT_FALSE(ReadTum(options_.out_tum + ".2", &warnings).empty());
+}
+
 TEST_F(VioProcessTest, AFullDiskIsSaidAndTheOdometryGoesOn) {
   options_.out_tum = "/dev/full";
   VioProcess process(bus_, options_, 0);
