@@ -125,6 +125,12 @@ Vio::View Vio::NewestKeyframe(const VioOutput& output) const {
   return {keyframe.camera, std::move(keyframe.corners), estimator_->Poses()};
 }
 
+void Vio::NoteCorrection(const MapId& map, int64_t revision) {
+  if (map == map_) {
+    group_revision_ = revision;
+  }
+}
+
 std::vector<Keyframe> Vio::Flush() { return Complete(estimator_->Flush()); }
 
 std::vector<Keyframe> Vio::StartAnew() {

@@ -83,8 +83,9 @@ class Vio {
   };
   // `output`: the result of AddImage or AddTracks for that image. Changes no state.
   View NewestKeyframe(const VioOutput& output) const;
-  // Revision of the newest correction applied to this map; it is written into the keyframes.
-  void set_group_revision(int64_t revision) { group_revision_ = revision; }
+  // Notes the revision of the newest correction, which is written into the map's keyframes. Ignored
+  // for another map.
+  void NoteCorrection(const MapId& map, int64_t revision);
 
  private:
   void OpenNewMap();

@@ -317,7 +317,7 @@ void VioProcess::TellLag(int64_t now_utime) {
 void VioProcess::OnCorrection(const Correction& correction) {
   if (shown_.Correct(correction)) {
     node_.Count("corrections");
-    vio_->set_group_revision(shown_.revision());
+    vio_->NoteCorrection(correction.map, correction.revision);
     localization_.Correct(correction);
     shown_.Sharpen(*localization_.T_map_odom());
   }

@@ -317,6 +317,27 @@ TEST_F(VioProcessTest, ALostOdometryOpensANewMap) {
   EXPECT_GT(expected, 3);
 }
 
+// A correction that comes between the loss and the next image is of the map that ended.
+TEST_F(VioProcessTest, ACorrectionOfTheLostMapIsNotOfTheNextOne) {
+  VioProcess process(bus_, options_, 0);
+  process.Open(world_.camera(), ImuNoise{});
+  Play(process, 0, 6);
+  next_imu_ = 9'000'000;
+  Play(process, 9, 9.1);
+  ASSERT_EQ(poses_.back().state, pose_t::STATE_LOST);
+  Correction correction;
+  correction.map = correction.group = {7, kMapUtime};
+  correction.revision = 4;
+  correction.covariance *= 1e-4;
+  PublishMessage(bus_, "CORRECTION_7", ToMessage(correction));
+  bus_.Drain();
+  Play(process, 9.1, 15);
+  process.Flush();
+  bus_.Drain();
+  EXPECT_EQ(keyframes_.back().id.map, (MapId{7, kMapUtime + 1}));
+  EXPECT_EQ(keyframes_.back().group_revision, 0);
+}
+
 // Poses of two odom frames must not have one map's id, nor be in one file.
 TEST_F(VioProcessTest, AMapThatIsLostBeforeItsFirstKeyframeEndsToo) {
   options_.out_tum = ::testing::TempDir() + "vio_process_lost_early.tum";
