@@ -33,7 +33,16 @@ Collector::Collector(int width, int height, const ImuNoise& noise,
     : input_(Empty(width, height, noise, q_body_cam)),
       tracker_(GuessedCamera(width, height), Forgiving()) {}
 
+void Collector::AddImu(const ImuSample& sample) {
+  if (IsPlausible(sample) && (input_.imu.empty() || sample.utime > input_.imu.back().utime)) {
+    input_.imu.push_back(sample);
+  }
+}
+
 void Collector::AddImage(int64_t utime, const cv::Mat& image) {
+  if (!input_.frames.empty() && utime <= input_.frames.back().utime) {
+    return;
+  }
   input_.frames.push_back(tracker_.Track(utime, image, Eigen::Quaterniond::Identity()));
 }
 

@@ -1,7 +1,8 @@
 #pragma once
 
-// Collects the input of a calibration image by image, from an uncalibrated camera. Images and
-// samples must each come in time order; either may be ahead of the other.
+// Collects the input of a calibration image by image, from an uncalibrated camera. Of images and of
+// samples, each kind in time order, either may be ahead of the other. An image or sample that is
+// not later than the last one is ignored, and so is an implausible sample.
 
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
@@ -18,7 +19,7 @@ class Collector {
   Collector(int width, int height, const ImuNoise& noise,
             const std::optional<Eigen::Quaterniond>& q_body_cam);
 
-  void AddImu(const ImuSample& sample) { input_.imu.push_back(sample); }
+  void AddImu(const ImuSample& sample);
   // 8-bit grey.
   void AddImage(int64_t utime, const cv::Mat& image);
   // Forgets all images and samples before this time.

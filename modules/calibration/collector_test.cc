@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <opencv2/core.hpp>
 
 #include "calibration/calibration_test_world.h"
@@ -63,6 +64,20 @@ TEST(Collector, ForgetsWhatIsOld) {
   ASSERT_EQ(collector.input().imu.size(), 4U);
   EXPECT_EQ(collector.input().frames.front().utime, 6000);
   EXPECT_EQ(collector.input().imu.front().utime, 6000);
+}
+
+// A browser may report a motion event without values, or twice.
+TEST(Collector, TakesOnlyPlausibleInputInTheOrderOfTime) {
+  Collector collector(64, 48, ImuNoise{}, std::nullopt);
+  for (const int64_t utime : {1000, 2000, 2000, 1500, 3000}) {
+    collector.AddImu({.utime = utime});
+    collector.AddImage(utime, Noise(1));
+  }
+  collector.AddImu({.utime = 4000, .gyro = Eigen::Vector3d(0, std::nan(""), 0)});
+  ASSERT_EQ(collector.input().imu.size(), 3U);
+  ASSERT_EQ(collector.input().frames.size(), 3U);
+  EXPECT_EQ(collector.input().imu.back().utime, 3000);
+  EXPECT_EQ(collector.input().frames.back().utime, 3000);
 }
 
 }  // namespace
