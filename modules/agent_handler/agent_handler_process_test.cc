@@ -2,9 +2,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
-
-#include <csignal>
 
 #include <algorithm>
 #include <filesystem>
@@ -12,6 +9,7 @@
 #include <utility>
 
 #include "agent_handler/link_test_world.h"
+#include "files/testing/full_disk.h"
 #include "link/agent_key.h"
 #include "log_file/log_writer.h"
 #include "messages/encoding.h"
@@ -106,17 +104,13 @@ TEST_F(LinkWorld, WithoutAHandlerEverythingWaits) {
   ExpectDelivered(100);
 }
 
-// RLIMIT_FSIZE refuses writes as a full disk does.
 TEST_F(LinkWorld, WhatIsNotOnDiskIsNotAcknowledged) {
-  std::signal(SIGXFSZ, SIG_IGN);
   Run(2);
-  rlimit limit{};
-  getrlimit(RLIMIT_FSIZE, &limit);
-  const rlimit full{std::filesystem::file_size(journal_path), limit.rlim_max};
-  setrlimit(RLIMIT_FSIZE, &full);
-  PublishKeyframes(5);
-  Run(5);
-  setrlimit(RLIMIT_FSIZE, &limit);
+  {
+    const FullDisk full(std::filesystem::file_size(journal_path));
+    PublishKeyframes(5);
+    Run(5);
+  }
   EXPECT_EQ(acknowledged, -1);
   EXPECT_TRUE(delivered.empty());
   Run(10);

@@ -2,11 +2,9 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
 #include <algorithm>
 #include <cmath>
-#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -15,6 +13,7 @@
 #include <set>
 
 #include "agent_handler/link_test_world.h"
+#include "files/testing/full_disk.h"
 #include "link/agent_key.h"
 #include "link/anchor_wire.h"
 #include "messages/encoding.h"
@@ -192,19 +191,16 @@ TEST_F(LinkWorld, AnAgentIsShutOutWithItsKey) {
 
 // Its keyframes wait for the disk meanwhile, and the journal does not have them yet.
 TEST_F(LinkWorld, AnAgentThatComesBackIsAskedForNothingTwice) {
-  std::signal(SIGXFSZ, SIG_IGN);
   Run(2);
-  rlimit limit{};
-  getrlimit(RLIMIT_FSIZE, &limit);
-  const rlimit full{std::filesystem::file_size(journal_path), limit.rlim_max};
-  setrlimit(RLIMIT_FSIZE, &full);
-  PublishKeyframes(2);
-  Run(2);
-  std::filesystem::rename(KeyFile(1), folder / "away");
-  Run(2);
-  std::filesystem::rename(folder / "away", KeyFile(1));
-  Run(3);
-  setrlimit(RLIMIT_FSIZE, &limit);
+  {
+    const FullDisk full(std::filesystem::file_size(journal_path));
+    PublishKeyframes(2);
+    Run(2);
+    std::filesystem::rename(KeyFile(1), folder / "away");
+    Run(2);
+    std::filesystem::rename(folder / "away", KeyFile(1));
+    Run(3);
+  }
   Run(5);
   ExpectDelivered(2);
   EXPECT_EQ(acknowledged, 1);

@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 #include <signal.h>
-#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -12,6 +11,8 @@
 #include <numeric>
 #include <string>
 #include <vector>
+
+#include "files/testing/full_disk.h"
 
 namespace pangea {
 namespace {
@@ -162,13 +163,10 @@ TEST_F(CheckpointFile, KilledWhileWritingLeavesTheOneBefore) {
   EXPECT_EQ(NumFiles(), 1u);
 }
 
-// A limit on the file size simulates a full disk.
 TEST_F(CheckpointFile, FullDiskIsAnErrorAndLeavesTheOneBefore) {
   Write(1);
   const int status = InChild([this] {
-    signal(SIGXFSZ, SIG_IGN);
-    const rlimit limit{2'000'000, 2'000'000};
-    setrlimit(RLIMIT_FSIZE, &limit);
+    const FullDisk full(2'000'000);
     try {
       CheckpointWriter writer(file(), kKey, kJournal);
       writer.Put(std::vector<uint8_t>(3'000'000));

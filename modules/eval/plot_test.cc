@@ -2,10 +2,8 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
 #include <cmath>
-#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -14,6 +12,7 @@
 #include <stdexcept>
 
 #include "eval/table.h"
+#include "files/testing/full_disk.h"
 
 namespace pangea {
 namespace {
@@ -94,15 +93,9 @@ TEST_F(PlotTest, FailuresAreReportedWithTheMend) {
 
 // As on a full disk, which gnuplot does not report.
 TEST_F(PlotTest, APictureThatIsCutOffIsNone) {
-  rlimit before{};
-  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
-  std::signal(SIGXFSZ, SIG_IGN);
-  const rlimit small{4600, before.rlim_max};
-  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
+  const FullDisk full(4600);
   EXPECT_THAT([&] { WritePng(Circle(), path_); },
               ::testing::ThrowsMessage<std::runtime_error>(HasSubstr("the picture is cut off")));
-  setrlimit(RLIMIT_FSIZE, &before);
-  std::signal(SIGXFSZ, SIG_DFL);
 }
 
 TEST_F(PlotTest, SevenAgentsHaveSevenColours) {

@@ -1,12 +1,12 @@
 #include "files/scratch_file.h"
 
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
-#include <csignal>
 #include <filesystem>
 #include <stdexcept>
 #include <vector>
+
+#include "files/testing/full_disk.h"
 
 namespace pangea {
 namespace {
@@ -56,17 +56,13 @@ TEST(ScratchFile, TakesNoMoreThanItMay) {
 
 // A disk that is full for a while: earlier records stay readable, and later ones can be written.
 TEST(ScratchFile, SaysWhyItCannotWriteAndTriesAgain) {
-  std::signal(SIGXFSZ, SIG_IGN);
   ScratchFile file({.folder = testing::TempDir()});
   const auto at = file.Append(Bytes(1000, 7));
   ASSERT_TRUE(at);
-  rlimit usual{};
-  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &usual), 0);
-  const rlimit small{1500, usual.rlim_max};
-  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
-  const auto refused = file.Append(Bytes(1000, 8));  // half of it would fit
-  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &usual), 0);
-  EXPECT_FALSE(refused);
+  {
+    const FullDisk full(1500);
+    EXPECT_FALSE(file.Append(Bytes(1000, 8))) << "half of it would fit";
+  }
   EXPECT_NE(file.problem().find("cannot be written: File too large"), std::string::npos)
       << file.problem();
   const auto later = file.Append(Bytes(1000, 9));

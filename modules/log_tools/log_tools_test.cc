@@ -3,14 +3,13 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
 #include <Eigen/Dense>
-#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
 
+#include "files/testing/full_disk.h"
 #include "log_file/log_reader.h"
 #include "log_file/log_writer.h"
 #include "log_tools/explain.h"
@@ -377,14 +376,9 @@ TEST(Explanation, IsToldWithoutAnInlier) {
 
 // A part of a log must not pass for the whole.
 TEST_F(LogToolsTest, AFullDiskLeavesNoPartOfALog) {
-  std::signal(SIGXFSZ, SIG_IGN);
-  rlimit limit{};
-  getrlimit(RLIMIT_FSIZE, &limit);
-  const rlimit full{300'000, limit.rlim_max};
-  setrlimit(RLIMIT_FSIZE, &full);
+  const FullDisk full(300'000);
   EXPECT_THROW(CutLog(kSample, {}, Path("cut.lcm")), std::runtime_error);
   EXPECT_THROW(MergeLogs({kSample, kSample}, Path("merged.lcm")), std::runtime_error);
-  setrlimit(RLIMIT_FSIZE, &limit);
   EXPECT_TRUE(fs::is_empty(folder_));
 }
 

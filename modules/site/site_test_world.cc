@@ -1,16 +1,15 @@
 #include "site/site_test_world.h"
 
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <csignal>
 #include <cstring>
 #include <optional>
 #include <stdexcept>
 
+#include "files/testing/full_disk.h"
 #include "log_file/log_reader.h"
 #include "messages/anchor_messages.h"
 #include "messages/channels.h"
@@ -201,9 +200,7 @@ std::string OnFullDisk(int64_t bytes, const std::function<void()>& action) {
   EXPECT_EQ(pipe(said), 0);
   const pid_t child = fork();
   if (child == 0) {
-    std::signal(SIGXFSZ, SIG_IGN);
-    const rlimit limit{static_cast<rlim_t>(bytes), static_cast<rlim_t>(bytes)};
-    setrlimit(RLIMIT_FSIZE, &limit);
+    const FullDisk full(static_cast<uint64_t>(bytes));
     try {
       action();
     } catch (const std::exception& error) {

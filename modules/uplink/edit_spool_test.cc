@@ -1,13 +1,12 @@
 #include "uplink/edit_spool.h"
 
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 #include <unistd.h>
 
-#include <csignal>
 #include <fstream>
 #include <map>
 
+#include "files/testing/full_disk.h"
 #include "messages/encoding.h"
 #include "messages/testing/test_anchors.h"
 
@@ -95,13 +94,10 @@ TEST_F(EditSpoolTest, AFullDiskLeavesTheOneBefore) {
   EditSpool spool(folder, 1);
   spool.Put(TestEdit(kA, 1, 1));
   EXPECT_FALSE(spool.refuses());
-  std::signal(SIGXFSZ, SIG_IGN);
-  rlimit before{};
-  getrlimit(RLIMIT_FSIZE, &before);
-  const rlimit full{100, before.rlim_max};
-  setrlimit(RLIMIT_FSIZE, &full);
-  spool.Put(TestEdit(kA, 2, 1));
-  setrlimit(RLIMIT_FSIZE, &before);
+  {
+    const FullDisk full(100);
+    spool.Put(TestEdit(kA, 2, 1));
+  }
   EXPECT_TRUE(spool.refuses());
   EXPECT_EQ(Left(), (Revisions{{kA, 1}}));
   spool.Remove(kA, 2);

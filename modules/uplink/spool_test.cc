@@ -3,13 +3,12 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
-#include <csignal>
 #include <fstream>
 #include <lcm/lcm-cpp.hpp>
 #include <random>
 
+#include "files/testing/full_disk.h"
 #include "messages/encoding.h"
 #include "messages/testing/test_keyframes.h"
 #include "uplink/thin.h"
@@ -265,16 +264,12 @@ TEST_F(SpoolTest, BeginsANewSegmentWhenOneIsFull) {
 }
 
 TEST_F(SpoolTest, ADiskThatRefusesHeals) {
-  std::signal(SIGXFSZ, SIG_IGN);
   Spool spool(folder, 1, kLarge);
   Add(&spool, 0);
-  rlimit limit{};
-  getrlimit(RLIMIT_FSIZE, &limit);
-  const rlimit full{static_cast<rlim_t>(spool.bytes() + 1000), limit.rlim_max};
-  setrlimit(RLIMIT_FSIZE, &full);
-  const bool taken = Add(&spool, 1);
-  setrlimit(RLIMIT_FSIZE, &limit);
-  EXPECT_FALSE(taken);
+  {
+    const FullDisk full(static_cast<uint64_t>(spool.bytes() + 1000));
+    EXPECT_FALSE(Add(&spool, 1));
+  }
   EXPECT_TRUE(Add(&spool, 2));
   EXPECT_EQ(spool.Read({kMap, 2}), EncodeTestKeyframe({kMap, 2}));
   EXPECT_EQ(spool.Kept().size(), 2u);
@@ -282,19 +277,13 @@ TEST_F(SpoolTest, ADiskThatRefusesHeals) {
 
 // The part of an event that a full disk took was longer than the event after it.
 TEST_F(SpoolTest, AFullDiskIsNoDamage) {
-  std::signal(SIGXFSZ, SIG_IGN);
   {
     Spool spool(folder, 1, kLarge);
     Add(&spool, 0);
-    rlimit limit{};
-    getrlimit(RLIMIT_FSIZE, &limit);
-    const rlimit full{static_cast<rlim_t>(spool.bytes() + 5000), limit.rlim_max};
-    setrlimit(RLIMIT_FSIZE, &full);
+    const FullDisk full(static_cast<uint64_t>(spool.bytes() + 5000));
     EXPECT_FALSE(Add(&spool, 1));
     const KeyframeId next{kMap, 2};
-    const bool taken = spool.Add(next, EncodeMessage(ToMessage(Bare(TestKeyframe(next)))), 2);
-    setrlimit(RLIMIT_FSIZE, &limit);
-    EXPECT_TRUE(taken);
+    EXPECT_TRUE(spool.Add(next, EncodeMessage(ToMessage(Bare(TestKeyframe(next)))), 2));
   }
   const Spool spool(folder, 1, kLarge);
   EXPECT_EQ(spool.num_damaged(), 0);

@@ -2,15 +2,14 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
 #include <algorithm>
-#include <csignal>
 #include <filesystem>
 #include <string>
 
 #include "bus/bus.h"
 #include "bus/node.h"
+#include "files/testing/full_disk.h"
 #include "messages/channels.h"
 #include "messages/testing/test_keyframes.h"
 #include "pangea/status_t.hpp"
@@ -69,10 +68,6 @@ TEST(UplinkProcess, KeyframesThatTheDiskRefusedAreStoredLater) {
       std::filesystem::path(testing::TempDir()) / "uplink_process_spool";
   std::filesystem::remove_all(folder);
   const MapId map{1, 1000};
-  std::signal(SIGXFSZ, SIG_IGN);
-  rlimit limit{};
-  getrlimit(RLIMIT_FSIZE, &limit);
-  const rlimit full{1000, limit.rlim_max};
   {
     LocalBus agent_bus, link_bus;
     Spool spool(folder, 1, 1 << 30);
@@ -82,12 +77,13 @@ TEST(UplinkProcess, KeyframesThatTheDiskRefusedAreStoredLater) {
       uplink.Poll(utime);
       uplink.Tick(utime);
     };
-    setrlimit(RLIMIT_FSIZE, &full);
-    agent_bus.Publish(channels::Keyframe(1), EncodeTestKeyframe({map, 0}));
-    agent_bus.Publish(channels::Keyframe(1), EncodeTestKeyframe({map, 1}));
-    run(1'000'000);
-    EXPECT_TRUE(spool.Kept().empty());
-    setrlimit(RLIMIT_FSIZE, &limit);
+    {
+      const FullDisk full(1000);
+      agent_bus.Publish(channels::Keyframe(1), EncodeTestKeyframe({map, 0}));
+      agent_bus.Publish(channels::Keyframe(1), EncodeTestKeyframe({map, 1}));
+      run(1'000'000);
+      EXPECT_TRUE(spool.Kept().empty());
+    }
     run(2'500'000);
   }
   Spool spool(folder, 1, 1 << 30);

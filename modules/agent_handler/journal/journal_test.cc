@@ -1,16 +1,15 @@
 #include "agent_handler/journal/journal.h"
 
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 #include <unistd.h>
 
-#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <lcm/lcm-cpp.hpp>
 
 #include "bus/retransmission/journal_reader.h"
+#include "files/testing/full_disk.h"
 #include "log_file/log_event.h"
 
 namespace pangea {
@@ -298,13 +297,10 @@ TEST_F(JournalTest, WhatCannotBeKeptIsLeftAsItIs) {
   Contents damaged = ContentsOf(path);
   damaged[45] ^= 1;
   WriteContents(damaged);
-  rlimit limit{};
-  getrlimit(RLIMIT_FSIZE, &limit);
-  std::signal(SIGXFSZ, SIG_IGN);
-  const rlimit full{10, limit.rlim_max};
-  setrlimit(RLIMIT_FSIZE, &full);
-  EXPECT_THROW(Open(), std::runtime_error);
-  setrlimit(RLIMIT_FSIZE, &limit);
+  {
+    const FullDisk full(10);
+    EXPECT_THROW(Open(), std::runtime_error);
+  }
   EXPECT_EQ(ContentsOf(path), damaged);
   EXPECT_EQ(Copies(), "");
 }
