@@ -8,6 +8,7 @@
 
 #include "agent_handler/agent_handler_process.h"
 #include "agent_handler/keygen.h"
+#include "bus/bus_url.h"
 #include "bus/status_log.h"
 #include "options/command_line.h"
 #include "options/options_arguments.h"
@@ -47,7 +48,7 @@ int main(int argc, char** argv) {
     if (journal.empty() || keys.empty()) {
       throw std::runtime_error("give --journal FILE and --keys FOLDER (or: keygen --agent ID)");
     }
-    pangea::RequireTwoUrls("--link", link, "--bus", server);
+    pangea::RequireTwoBuses("--link", link, "--bus", server);
     pangea::LcmBus link_bus(link, pangea::LcmBus::Fragments::kRefused);
     pangea::LcmBus server_bus(server);
     const auto remove_checkpoints = [&checkpoints] {

@@ -20,4 +20,6 @@ int64_t WallUtime() {
 
 int64_t SteadyMicros() { return MicrosOf<std::chrono::steady_clock>(); }
 
+double SteadySeconds() { return 1e-6 * static_cast<double>(SteadyMicros()); }
+
 }  // namespace pangea

@@ -1,6 +1,6 @@
 #pragma once
 
-// The clocks of a process, in microseconds.
+// The clocks of a process.
 
 #include <cstdint>
 
@@ -12,5 +12,6 @@ namespace pangea {
 int64_t WallUtime();
 // Monotonic clock.
 int64_t SteadyMicros();
+double SteadySeconds();
 
 }  // namespace pangea

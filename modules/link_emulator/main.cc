@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "bus/bus_url.h"
 #include "bus/status_log.h"
 #include "link_emulator/link_emulator_process.h"
 #include "options/command_line.h"
@@ -33,7 +34,7 @@ int main(int argc, char** argv) {
     if (agent_id == 0 || agent_link.empty() || server_link.empty() || status_bus.empty()) {
       throw std::runtime_error("give --agent ID, --agent-link, --server-link and --bus URL");
     }
-    pangea::RequireTwoUrls("--agent-link", agent_link, "--server-link", server_link);
+    pangea::RequireTwoBuses("--agent-link", agent_link, "--server-link", server_link);
     constexpr auto kNoFragments = pangea::LcmBus::Fragments::kRefused;
     pangea::LcmBus agent_bus(agent_link, kNoFragments), server_bus(server_link, kNoFragments);
     pangea::LcmBus status(status_bus);

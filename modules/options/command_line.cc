@@ -65,15 +65,6 @@ bool OutputIsWritten(const std::string& program) {
   return false;
 }
 
-void RequireTwoUrls(const std::string& option, const std::string& url,
-                    const std::string& other_option, const std::string& other_url) {
-  if (url.substr(0, url.find('?')) == other_url.substr(0, other_url.find('?'))) {
-    throw std::runtime_error(
-        fmt::format("{} and {} are both {}: give two LCM URLs that differ before the '?'", option,
-                    other_option, url));
-  }
-}
-
 CLI::Validator Positive() {
   return NumberThat([](double value) { return value > 0; }, "above 0");
 }

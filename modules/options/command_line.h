@@ -18,11 +18,6 @@ int RunSubcommand(CLI::App& app, int argc, char** argv);
 // Flushes stdout. False, with a line on stderr, if not all output could be written (a full disk).
 bool OutputIsWritten(const std::string& program);
 
-// Throws std::runtime_error if two options have the same LCM URL (what follows a '?' does not
-// count): what is relayed from one bus to the other would come back.
-void RequireTwoUrls(const std::string& option, const std::string& url,
-                    const std::string& other_option, const std::string& other_url);
-
 // For an option's check(): a finite number that is > 0, or >= 0. CLI11's own validators accept NaN.
 CLI::Validator Positive();
 CLI::Validator NotNegative();

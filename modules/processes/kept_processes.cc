@@ -20,12 +20,11 @@ bool QuickDeaths::Note(const std::string& why, double ran_s) {
   return count_ >= kMaxQuickDeaths;
 }
 
-int RecentEnds::Note(double now_s) {
+void RecentEnds::Note(double now_s) {
   ends_s_.push_back(now_s);
   while (ends_s_.front() <= now_s - kWindow_s) {
     ends_s_.pop_front();
   }
-  return static_cast<int>(ends_s_.size());
 }
 
 KeptProcesses::KeptProcesses(std::filesystem::path logs) : logs_(std::move(logs)) {}
@@ -62,16 +61,17 @@ std::vector<KeptProcesses::Revived> KeptProcesses::Revive() {
     std::string why = kept.child->HowItEnded();
     kept.ever_ran |= kept.child->RanSeconds() > QuickDeaths::kAtItsStart_s;
     if (!std::exchange(kept.expects_end, false)) {
-      kept.unexpected = kept.recent_ends.Note(1e-6 * static_cast<double>(SteadyMicros()));
-      kept.given_up =
-          kept.quick_deaths.Note(why, kept.child->RanSeconds()) || kept.unexpected > kMaxRestarts;
+      kept.recent_ends.Note(SteadySeconds());
+      kept.given_up = kept.quick_deaths.Note(why, kept.child->RanSeconds()) ||
+                      kept.recent_ends.count() > kMaxRestarts;
     }
     const bool waited = std::exchange(kept.waits, false);
     if (!kept.given_up) {
       StartAgain(&kept, &why);
     }
     if (!waited || !kept.waits) {
-      revived.push_back({kept.child->name(), why, kept.given_up, kept.ever_ran, kept.unexpected});
+      revived.push_back(
+          {kept.child->name(), why, kept.given_up, kept.ever_ran, kept.recent_ends.count()});
     }
   }
   return revived;

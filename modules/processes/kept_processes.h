@@ -35,8 +35,10 @@ class RecentEnds {
  public:
   static constexpr double kWindow_s = 3600;
 
-  // Notes an end; `now_s` must not decrease. Returns the number of ends within the window.
-  int Note(double now_s);
+  // Notes an end; `now_s` must not decrease.
+  void Note(double now_s);
+  // Number of ends within the window before the last one noted.
+  int count() const { return static_cast<int>(ends_s_.size()); }
 
  private:
   std::deque<double> ends_s_;
@@ -76,7 +78,6 @@ class KeptProcesses {
     std::optional<ChildProcess> child;
     QuickDeaths quick_deaths;
     RecentEnds recent_ends;
-    int unexpected = 0;
     bool expects_end = false;
     bool ever_ran = false;
     bool given_up = false;

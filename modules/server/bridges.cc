@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "bus/process.h"
+#include "bus/wall_clock.h"
 #include "processes/child_process.h"
 #include "server/server.h"
 

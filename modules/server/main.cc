@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "bus/bus.h"
+#include "bus/bus_url.h"
 #include "link/wire.h"
 #include "options/command_line.h"
 #include "server/server.h"
@@ -121,7 +122,7 @@ void UseProcessOptions(Arguments* arguments) {
 
 // Otherwise each process would refuse the URL, again after each of its starts.
 void RequireBus(const std::string& option, const std::string& url) {
-  if (const std::string why = site::WhyNoBus(url); !why.empty()) {
+  if (const std::string why = WhyNoBus(url); !why.empty()) {
     throw std::runtime_error(fmt::format("{}: {}", option, why));
   }
 }
@@ -153,7 +154,7 @@ int Run(Arguments* arguments) {
     options.cluster.site = site.description.name;
   }
   UseDefaults(&options);
-  RequireTwoUrls("--bus", options.bus, "--link", options.link);
+  RequireTwoBuses("--bus", options.bus, "--link", options.link);
   RequireBus("--bus", options.bus);
   RequireBus("--link", options.link);
   UseProcessOptions(arguments);

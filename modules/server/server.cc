@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "bus/process.h"
+#include "bus/wall_clock.h"
 #include "options/nearest_word.h"
 #include "processes/child_process.h"
 #include "processes/kept_processes.h"
@@ -144,10 +145,6 @@ std::string ProgramOf(const std::string& process) {
   std::string name = "pangea-" + process;
   std::ranges::replace(name, '_', '-');
   return SiblingProgram(name);
-}
-
-double SteadySeconds() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
 void AddProcessOptions(const std::string& text, ServerSetup* options) {

@@ -41,7 +41,6 @@ void AddOptionsFolder(const std::filesystem::path& folder, ServerSetup* options)
 // The path of a server process' program, in the same directory as this one. Throws
 // std::runtime_error.
 std::string ProgramOf(const std::string& process);
-double SteadySeconds();
 
 // Returns the exit code: 0 after a signal, 1 if a process was given up (kept_processes.h), except a
 // gateway that has run. Prints on stdout what it starts. Throws std::runtime_error if it cannot

@@ -172,7 +172,7 @@ int RunReplay(const ReplayArguments& arguments, LogReadings* readings) {
   const SessionRecord known = KnownOf(arguments, readings);
   const ServerOptions options = OptionsOf(arguments, readings);
   const OutFolder folder(out);
-  const int64_t begin = SteadyMicros();
+  const double begin_s = SteadySeconds();
   if (arguments.checkpoint_s) {
     RunReplayPart(arguments, options, out / "session.lcm", readings);
   } else {
@@ -180,7 +180,7 @@ int RunReplay(const ReplayArguments& arguments, LogReadings* readings) {
     std::cout << fmt::format("replayed {} keyframes of {} agents\n", summary.keyframes,
                              summary.agent_ids.size());
   }
-  WriteTiming(1e-6 * static_cast<double>(SteadyMicros() - begin), out);
+  WriteTiming(SteadySeconds() - begin_s, out);
   int exit_code = PrintReport(ReportLog(out / "session.lcm", known, out, readings));
   if (arguments.explain) {
     ExplainInto(out, *arguments.explain, known, readings);

@@ -13,7 +13,7 @@
 #include <stdexcept>
 
 #include "bus/bus.h"
-#include "bus/transport/udpm_socket.h"
+#include "bus/bus_url.h"
 #include "files/text_file.h"
 #include "files/whole_file.h"
 #include "link/wire.h"
@@ -47,9 +47,8 @@ void CheckDescription(const fs::path& file, const SiteDescription& description) 
       std::ranges::any_of(name, [](unsigned char c) { return c < 0x20 || c == 0x7f; })) {
     refuse(fmt::format("name: give 1 to {} printable bytes", kMaxName));
   }
-  const auto address = [](const std::string& url) { return url.substr(0, url.find('?')); };
   if (description.bus.empty() || description.link.empty() ||
-      address(description.bus) == address(description.link)) {
+      IsOneBus(description.bus, description.link)) {
     refuse("bus, link: give two LCM URLs that differ before the '?'");
   }
   for (const auto& [key, url] : {std::pair("bus", description.bus), {"link", description.link}}) {
@@ -125,24 +124,6 @@ int ReadPid(int fd) {
 }
 
 }  // namespace
-
-std::string WhyNoBus(const std::string& url) {
-  if (url.starts_with("tcpq://")) {
-    return "";
-  }
-  if (!url.starts_with("udpm://")) {
-    return fmt::format(
-        "'{}' is no LCM URL between processes: give udpm://GROUP:PORT?ttl=N, or "
-        "tcpq://HOST:PORT",
-        url);
-  }
-  try {
-    ParseUdpmUrl(url);
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
-  return "";
-}
 
 std::string NameOfFolder(const fs::path& folder) {
   return fs::absolute(folder / "").parent_path().filename();

@@ -53,9 +53,6 @@ struct Site {
 
 // The default name of a site.
 std::string NameOfFolder(const std::filesystem::path& folder);
-// Why several processes cannot share a bus with this URL; empty if they can. Checks it as LcmBus
-// does when it opens it, but without a network.
-std::string WhyNoBus(const std::string& url);
 // A description with the present time and the default buses.
 SiteDescription NewDescription(const std::string& name);
 

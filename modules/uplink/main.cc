@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "bus/bus_url.h"
 #include "bus/status_log.h"
 #include "link/agent_key.h"
 #include "options/command_line.h"
@@ -41,7 +42,7 @@ int Run(const Arguments& a, const UplinkOptions& options, const std::string& opt
   if (a.agent_id == 0 || a.key.empty()) {
     throw std::runtime_error("give --agent ID and --key FILE");
   }
-  RequireTwoUrls("--bus", a.bus, "--link", a.link);
+  RequireTwoBuses("--bus", a.bus, "--link", a.link);
   std::optional<Spool> spool;
   std::optional<EditSpool> edit_spool;
   if (!a.spool.empty()) {
