@@ -12,8 +12,8 @@
 #include "messages/encoding.h"
 #include "messages/messages.h"
 #include "report/metrics/report_metrics.h"
+#include "report/report_files.h"
 #include "report/report_pictures.h"
-#include "report/report_text.h"
 
 namespace pangea {
 namespace {
@@ -82,9 +82,8 @@ std::vector<std::string> ExportTum(const std::string& log, const std::string& fo
   for (const FinalGroup& group : groups) {
     for (const int32_t agent : group.Agents()) {
       // Groups are sorted by number of agents, so the agent's first group is the largest.
-      const std::string name = of_agent[agent]++ == 0
-                                   ? fmt::format("agent_{}.tum", agent)
-                                   : fmt::format("agent_{}.{}.tum", agent, FileName(group.frame));
+      const std::string name =
+          of_agent[agent]++ == 0 ? TrajectoryFile(agent) : TrajectoryFile(agent, group.frame);
       files.push_back(fmt::format("{}/{}", folder, name));
       WriteTum(files.back(), group.TrajectoryOf(agent));
     }

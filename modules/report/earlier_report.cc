@@ -1,7 +1,5 @@
 #include "report/earlier_report.h"
 
-#include <fmt/format.h>
-
 #include <cstdint>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -10,8 +8,7 @@
 
 #include "core/ids.h"
 #include "files/text_file.h"
-#include "report/report_anchor_pictures.h"
-#include "report/report_text.h"
+#include "report/report_files.h"
 
 namespace pangea {
 namespace {
@@ -29,18 +26,16 @@ MapId MapOf(const std::string& text) {
   return map;
 }
 
-// The names of report.h. A map has fewer of these files.
+// A map has fewer of these files.
 std::vector<std::string> FilesOf(const json& report) {
-  std::vector<std::string> files{"map.ply", "trajectory.png", "error.png", kAnchorPicture};
+  std::vector<std::string> files{PlyFile(), TrajectoryPicture(), kErrorPicture, kAnchorPicture};
   for (const json& agent : report.at("agents")) {
-    const std::string prefix = fmt::format("agent_{}", agent.at("id").get<int32_t>());
-    files.insert(files.end(), {prefix + ".tum", prefix + ".vio.tum"});
-    for (const json& id : agent.at("map_ids")) {
-      const std::string map = FileName(MapOf(id.get<std::string>()));
-      files.push_back(fmt::format("{}.{}.tum", prefix, map));
-      files.push_back(fmt::format("{}.{}.vio.tum", prefix, map));
-      files.push_back(fmt::format("map.{}.ply", map));
-      files.push_back(fmt::format("trajectory.{}.png", map));
+    const auto id = agent.at("id").get<int32_t>();
+    files.insert(files.end(), {TrajectoryFile(id), OdometryFile(id)});
+    for (const json& map_id : agent.at("map_ids")) {
+      const MapId map = MapOf(map_id.get<std::string>());
+      files.insert(files.end(), {TrajectoryFile(id, map), OdometryFile(id, map), PlyFile(map),
+                                 TrajectoryPicture(map)});
     }
   }
   return files;

@@ -9,6 +9,7 @@
 #include "report/earlier_report.h"
 #include "report/html/report_html.h"
 #include "report/report_anchor_pictures.h"
+#include "report/report_files.h"
 #include "report/report_json.h"
 #include "report/report_pictures.h"
 #include "report/report_text.h"
@@ -20,21 +21,22 @@ using nlohmann::ordered_json;
 
 void WriteTrajectories(const AgentMetrics& agent, const std::vector<GroupMetrics>& groups,
                        const std::string& folder) {
-  const std::string prefix = fmt::format("{}/agent_{}", folder, agent.id);
+  const auto write = [&folder](const std::string& file, const Trajectory& trajectory) {
+    WriteTum(folder + "/" + file, trajectory);
+  };
   for (const auto& [map, odometry] : agent.odometry) {
     if (map != agent.main_map) {
-      WriteTum(fmt::format("{}.{}.vio.tum", prefix, FileName(map)), odometry);
+      write(OdometryFile(agent.id, map), odometry);
     }
   }
   const auto main = agent.odometry.find(agent.main_map);
-  WriteTum(prefix + ".vio.tum", main == agent.odometry.end() ? Trajectory() : main->second);
-  WriteTum(prefix + ".tum",
-           groups.empty() ? Trajectory() : groups[agent.group].group.TrajectoryOf(agent.id));
+  write(OdometryFile(agent.id), main == agent.odometry.end() ? Trajectory() : main->second);
+  write(TrajectoryFile(agent.id),
+        groups.empty() ? Trajectory() : groups[agent.group].group.TrajectoryOf(agent.id));
   for (size_t i = 0; i < groups.size(); ++i) {
     for (const MapId& map : groups[i].group.maps) {
       if (i != agent.group && map.agent_id == agent.id) {
-        WriteTum(fmt::format("{}.{}.tum", prefix, FileName(map)),
-                 groups[i].group.TrajectoryOf(map));
+        write(TrajectoryFile(agent.id, map), groups[i].group.TrajectoryOf(map));
       }
     }
   }
@@ -50,13 +52,12 @@ WrittenReport WriteReport(const ReportInput& input, const std::string& folder,
   for (const AgentMetrics& agent : metrics.agents) {
     WriteTrajectories(agent, metrics.groups, folder);
   }
-  WriteTextFile(folder + "/map.ply",
+  WriteTextFile(folder + "/" + PlyFile(),
                 MapPly(session, metrics,
                        metrics.groups.empty() ? FinalGroup() : metrics.groups.front().group));
   for (size_t i = 1; i < metrics.groups.size(); ++i) {
     const FinalGroup& group = metrics.groups[i].group;
-    WriteTextFile(fmt::format("{}/map.{}.ply", folder, FileName(group.frame)),
-                  MapPly(session, metrics, group));
+    WriteTextFile(folder + "/" + PlyFile(group.frame), MapPly(session, metrics, group));
   }
   try {
     for (const Picture& picture : Pictures(metrics)) {

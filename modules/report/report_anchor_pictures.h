@@ -8,7 +8,6 @@
 
 namespace pangea {
 
-inline constexpr const char* kAnchorPicture = "anchors.jpg";
 inline constexpr size_t kMaxAnchorPictures = 4;
 inline constexpr const char* kAnchorPictureExplained =
     "Left: where the agent placed it. Right: another agent's image. The cube stands where the "

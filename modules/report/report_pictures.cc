@@ -7,7 +7,7 @@
 
 #include "core/keyframe.h"
 #include "eval/evaluate.h"
-#include "report/report_text.h"
+#include "report/report_files.h"
 
 namespace pangea {
 namespace {
@@ -91,7 +91,7 @@ std::string GroupTitle(const GroupMetrics& group) {
 }
 
 Picture AllWithGroundTruth(const ReportMetrics& metrics) {
-  Picture picture{"trajectory.png", TopViewPlot("")};
+  Picture picture{TrajectoryPicture(), TopViewPlot("")};
   for (const AgentMetrics& agent : metrics.agents) {
     if (!agent.ground_truth.empty()) {
       picture.plot.lines.push_back({.label = picture.plot.lines.empty() ? "ground truth" : "",
@@ -114,7 +114,7 @@ Picture AllWithGroundTruth(const ReportMetrics& metrics) {
 }
 
 Picture ErrorPicture(const ReportMetrics& metrics) {
-  Picture picture{"error.png",
+  Picture picture{kErrorPicture,
                   {.title = "position error",
                    .x_label = "time since the ground truth's beginning [s]",
                    .y_label = "position error [m]",
@@ -185,9 +185,8 @@ std::vector<Picture> Pictures(const ReportMetrics& metrics) {
   }
   for (const GroupMetrics& group : metrics.groups) {
     if (!group.joint) {
-      const std::string file = pictures.empty()
-                                   ? "trajectory.png"
-                                   : fmt::format("trajectory.{}.png", FileName(group.group.frame));
+      const std::string file =
+          pictures.empty() ? TrajectoryPicture() : TrajectoryPicture(group.group.frame);
       pictures.push_back({file, TopViewPlot(GroupTitle(group) + ", in the group's map frame")});
       AddGroup(metrics, group, &pictures.back().plot);
     }

@@ -32,8 +32,7 @@ inline constexpr const char* kNeesExplained =
 inline constexpr const char* kProcessesExplained =
     "Realtime: seconds of session per second of the process' CPU time. In, out, dropped: messages; "
     "median, p99: handling time of the newest 1000; MB: memory. Counts and CPU time are those "
-    "since "
-    "its last start.";
+    "since its last start.";
 
 // One line for each fusion or split of a group.
 std::vector<std::string> ChangeLines(const CapturedSession& session, const ReportMetrics& metrics);

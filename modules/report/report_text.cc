@@ -3,13 +3,10 @@
 #include <fmt/format.h>
 
 #include "report/report_anchor_pictures.h"
+#include "report/report_files.h"
 #include "report/report_tables.h"
 
 namespace pangea {
-
-std::string FileName(const MapId& map) {
-  return fmt::format("{}_{}", map.agent_id, map.opened_utime);
-}
 
 std::string ReportMarkdown(const ReportInput& input, const CapturedSession& session,
                            const ReportMetrics& metrics, bool has_anchor_picture) {
