@@ -16,7 +16,7 @@
 
 namespace pangea {
 
-using SpeedBiasBlock = Eigen::Matrix<double, 9, 1>;
+using MotionBlock = Eigen::Matrix<double, 9, 1>;
 
 Rigid3 PoseFromBlock(const double* block);
 void PoseToBlock(const Rigid3& pose, double* block);

@@ -18,14 +18,14 @@ using Eigen::VectorXd;
 // Pose and motion together, displaced by an offset in their tangents.
 struct Blocks {
   Rigid3 pose;
-  SpeedBiasBlock motion;
+  MotionBlock motion;
 
   explicit Blocks(const KeyframeState& state) : pose(state.T_map_body) {
     motion << state.v_map_body, state.gyro_bias, state.accel_bias;
   }
   void Write(const VectorXd& offset, double* pose_block, double* motion_block) const {
     PoseToBlock(pose.Plus(offset.head<6>()), pose_block);
-    Eigen::Map<SpeedBiasBlock> moved(motion_block);
+    Eigen::Map<MotionBlock> moved(motion_block);
     moved = motion + offset.tail<9>();
   }
 };

@@ -258,39 +258,39 @@ std::vector<KeyframePair> GlobalBa::TakeNewPairs(const MapState& state, const Ma
 }
 
 std::unique_ptr<BaProblem> GlobalBa::Whole(const MapState& state, const MapPoses& poses) {
-  std::vector<MatchedPair> places;
+  std::vector<MatchedPair> pairs;
   for (const MapId& map : state.maps) {
     for (const KeyframePair& pair : pairs_.OfMap(map)) {
-      AddPlace(pair, &places);
+      AddPair(pair, &pairs);
     }
   }
-  return std::make_unique<BaProblem>(MakeGroupWorld(poses, places, &store_), options_.ba);
+  return std::make_unique<BaProblem>(MakeGroupWorld(poses, pairs, &store_), options_.ba);
 }
 
 std::unique_ptr<BaProblem> GlobalBa::Local(const MapPoses& poses) {
   const AdjustedGroup& adjusted = refined_.at(work_->state->group).adjusted;
   const LocalPart part = ChooseLocalPart(poses, adjusted, pairs_, work_->new_pairs,
                                          options_.local.max_neighbours, &store_);
-  std::vector<MatchedPair> places;
+  std::vector<MatchedPair> pairs;
   for (const std::set<KeyframeId>* keyframes : {&part.moving, &part.fixed}) {
     for (const KeyframeId& id : *keyframes) {
       for (const KeyframePair& pair : pairs_.OfQuery(id)) {
         if (part.moving.contains(pair.second) || part.fixed.contains(pair.second)) {
-          AddPlace(pair, &places);
+          AddPair(pair, &pairs);
         }
       }
     }
   }
-  return std::make_unique<BaProblem>(MakeLocalWorld(poses, part, adjusted, places, &store_),
+  return std::make_unique<BaProblem>(MakeLocalWorld(poses, part, adjusted, pairs, &store_),
                                      options_.ba);
 }
 
-void GlobalBa::AddPlace(const KeyframePair& pair, std::vector<MatchedPair>* places) {
+void GlobalBa::AddPair(const KeyframePair& pair, std::vector<MatchedPair>* pairs) {
   const auto corners = matched_.find(pair);
   const auto record =
       corners == matched_.end() ? std::nullopt : corners->second.Bytes(records_.get());
   if (record) {
-    places->push_back({pair.first, pair.second, CornersFromRecord(*record)});
+    pairs->push_back({pair.first, pair.second, CornersFromRecord(*record)});
   }
 }
 

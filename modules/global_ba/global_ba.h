@@ -125,7 +125,7 @@ class GlobalBa {
   std::vector<KeyframePair> TakeNewPairs(const MapState& state, const MapPoses& poses);
   std::unique_ptr<BaProblem> Whole(const MapState& state, const MapPoses& poses);
   std::unique_ptr<BaProblem> Local(const MapPoses& poses);
-  void AddPlace(const KeyframePair& pair, std::vector<MatchedPair>* places);
+  void AddPair(const KeyframePair& pair, std::vector<MatchedPair>* pairs);
   void DropIfAbout(const MapId& map);
   MapState Finish();
 

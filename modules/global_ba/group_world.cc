@@ -94,17 +94,17 @@ class Maker {
         cull_[i] = Cull::kAlways;
       }
     }
-    HoldCameras(adjusted, state, part);
+    FixCameras(adjusted, state, part);
   }
 
-  BaWorld Finish(const std::vector<MatchedPair>& places) {
+  BaWorld Finish(const std::vector<MatchedPair>& pairs) {
     SetUnknownScales(scale_sigmas_, &world_);
     std::vector<MatchedKeyframes> matches;
-    for (const MatchedPair& place : places) {
-      const auto query = index_.find(place.query);
-      const auto match = index_.find(place.match);
+    for (const MatchedPair& pair : pairs) {
+      const auto query = index_.find(pair.query);
+      const auto match = index_.find(pair.match);
       if (query != index_.end() && match != index_.end()) {
-        matches.push_back({query->second, match->second, place.corners});
+        matches.push_back({query->second, match->second, pair.corners});
         NeedEnds(query->second, match->second);
       }
     }
@@ -119,7 +119,7 @@ class Maker {
     }
   }
 
-  void HoldCameras(const AdjustedGroup& adjusted, const MapPoses& state, const LocalPart& part) {
+  void FixCameras(const AdjustedGroup& adjusted, const MapPoses& state, const LocalPart& part) {
     for (const BaKeyframe& keyframe : world_.keyframes) {
       const MapId& map = keyframe.id.map;
       const auto known = adjusted.cameras.find(map);
@@ -152,17 +152,17 @@ void DropWhatIsHeld(BaWorld* world) {
 
 }  // namespace
 
-BaWorld MakeGroupWorld(const MapPoses& state, const std::vector<MatchedPair>& places,
+BaWorld MakeGroupWorld(const MapPoses& state, const std::vector<MatchedPair>& pairs,
                        KeyframeStore* store) {
   Maker maker(store);
   for (const auto& [id, T_map_body] : state) {
     maker.Add(id, T_map_body);
   }
-  return maker.Finish(places);
+  return maker.Finish(pairs);
 }
 
 BaWorld MakeLocalWorld(const MapPoses& state, const LocalPart& part, const AdjustedGroup& adjusted,
-                       const std::vector<MatchedPair>& places, KeyframeStore* store) {
+                       const std::vector<MatchedPair>& pairs, KeyframeStore* store) {
   Maker maker(store);
   std::set<KeyframeId> all = part.fixed;
   all.insert(part.moving.begin(), part.moving.end());
@@ -170,7 +170,7 @@ BaWorld MakeLocalWorld(const MapPoses& state, const LocalPart& part, const Adjus
     maker.Add(id, state.at(id));
   }
   maker.StartFrom(adjusted, state, part);
-  BaWorld world = maker.Finish(places);
+  BaWorld world = maker.Finish(pairs);
   DropWhatIsHeld(&world);
   return world;
 }

@@ -21,12 +21,12 @@ struct MatchedPair {
 };
 
 // Leaves out keyframes that the store does not have, and redundant ones (redundancy.h).
-BaWorld MakeGroupWorld(const MapPoses& state, const std::vector<MatchedPair>& places,
+BaWorld MakeGroupWorld(const MapPoses& state, const std::vector<MatchedPair>& pairs,
                        KeyframeStore* store);
 
 // Only the part. A map's camera is fixed if most of the map's keyframes are: they have more
 // information on it.
 BaWorld MakeLocalWorld(const MapPoses& state, const LocalPart& part, const AdjustedGroup& adjusted,
-                       const std::vector<MatchedPair>& places, KeyframeStore* store);
+                       const std::vector<MatchedPair>& pairs, KeyframeStore* store);
 
 }  // namespace pangea

@@ -31,7 +31,7 @@ struct Group {
         messages(MessagesOf(truth)) {
     for (const PlaceMatch& match : messages.matches) {
       for (const PlaceCandidate& candidate : match.candidates) {
-        places.push_back({match.query, candidate.match, candidate.corner_matches});
+        pairs.push_back({match.query, candidate.match, candidate.corner_matches});
       }
     }
   }
@@ -40,12 +40,12 @@ struct Group {
     for (const Keyframe& keyframe : messages.keyframes) {
       store.Add(keyframe);
     }
-    return MakeGroupWorld(PosesOf(messages.state), places, &store);
+    return MakeGroupWorld(PosesOf(messages.state), pairs, &store);
   }
 
   BaTestWorld truth;
   BaTestMessages messages;
-  std::vector<MatchedPair> places;
+  std::vector<MatchedPair> pairs;
 };
 
 // Number of landmarks that keyframes of both agents see.
@@ -90,13 +90,13 @@ TEST(Landmarks, MatchesTieTwoMapsOnceForEachPairOfTracks) {
   Group group;
   const BaWorld all = group.World();
   EXPECT_GT(CountShared(all), 0.9 * static_cast<double>(all.landmarks.size()));
-  group.places.resize(1);
+  group.pairs.resize(1);
   const BaWorld one = group.World();
   EXPECT_GT(CountShared(one), 0);
   const size_t with_one = one.observations.size();
-  group.places.push_back(group.places.front());
+  group.pairs.push_back(group.pairs.front());
   EXPECT_EQ(group.World().observations.size(), with_one);
-  group.places.clear();
+  group.pairs.clear();
   EXPECT_EQ(CountShared(group.World()), 0);
 }
 
@@ -157,13 +157,13 @@ TEST(Landmarks, ACornerSeesATrackOnceHoweverManyKeyframesItIsMatchedWith) {
   std::vector<Keyframe>& keyframes = group.messages.keyframes;
   std::vector<MatchedPair> beside;
   size_t offered_again = 0;
-  for (const MatchedPair& place : group.places) {
-    const int neighbour = place.match.seq > 0 ? place.match.seq - 1 : 1;
-    MatchedPair& other = beside.emplace_back(place);
+  for (const MatchedPair& pair : group.pairs) {
+    const int neighbour = pair.match.seq > 0 ? pair.match.seq - 1 : 1;
+    MatchedPair& other = beside.emplace_back(pair);
     other.match = keyframes[neighbour].id;
     other.corners.clear();
-    for (const auto& [corner, unused] : place.corners) {
-      const int32_t id = keyframes[kKeyframes + place.query.seq].corners[corner].landmark_id;
+    for (const auto& [corner, unused] : pair.corners) {
+      const int32_t id = keyframes[kKeyframes + pair.query.seq].corners[corner].landmark_id;
       const auto& there = keyframes[neighbour].corners;
       const auto same = std::ranges::find(there, id, &Corner::landmark_id);
       if (same != there.end()) {
@@ -178,7 +178,7 @@ TEST(Landmarks, ACornerSeesATrackOnceHoweverManyKeyframesItIsMatchedWith) {
       corner.landmark_id = keyframe.id.map.agent_id == 1 ? corner.landmark_id : kNoLandmark;
     }
   }
-  group.places.insert(group.places.end(), beside.begin(), beside.end());
+  group.pairs.insert(group.pairs.end(), beside.begin(), beside.end());
   const BaWorld world = group.World();
   std::set<std::tuple<int, int, double, double>> seen_once;
   for (const BaObservation& seen : world.observations) {
@@ -197,9 +197,9 @@ TEST(Landmarks, ATrackThatIsNotOnePointIsLeftOut) {
 TEST(Landmarks, AWrongMatchIsLeftOut) {
   Group group;
   const size_t right = group.World().observations.size();
-  for (MatchedPair& place : group.places) {
-    for (size_t i = 0; i + 1 < place.corners.size(); i += 2) {
-      std::swap(place.corners[i].second, place.corners[i + 1].second);
+  for (MatchedPair& pair : group.pairs) {
+    for (size_t i = 0; i + 1 < pair.corners.size(); i += 2) {
+      std::swap(pair.corners[i].second, pair.corners[i + 1].second);
     }
   }
   const BaWorld world = group.World();
@@ -215,7 +215,7 @@ TEST(Landmarks, AWrongMatchIsLeftOut) {
 
 TEST(Landmarks, ParallelRaysMakeNone) {
   Group group;
-  group.places.clear();
+  group.pairs.clear();
   group.messages.state.keyframes.resize(1);
   EXPECT_TRUE(group.World().landmarks.empty());
 }

@@ -16,7 +16,7 @@ BaBlocks::BaBlocks(const BaWorld& world)
     PoseToBlock(keyframe.state.T_map_body, Add(kPoseSize, kPoseTangentSize, keyframe.fixed));
   }
   for (const BaKeyframe& keyframe : world.keyframes) {
-    Eigen::Map<SpeedBiasBlock>(Add(kMotionSize, kMotionSize, keyframe.fixed))
+    Eigen::Map<MotionBlock>(Add(kMotionSize, kMotionSize, keyframe.fixed))
         << keyframe.state.v_map_body,
         keyframe.state.gyro_bias, keyframe.state.accel_bias;
   }

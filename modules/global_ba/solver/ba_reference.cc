@@ -62,7 +62,7 @@ class Reference {
     for (int i = 0; i < static_cast<int>(world_->keyframes.size()); ++i) {
       const BaKeyframe& keyframe = world_->keyframes[i];
       PoseToBlock(keyframe.state.T_map_body, Pose(i));
-      Eigen::Map<SpeedBiasBlock>(Motion(i)) << keyframe.state.v_map_body, keyframe.state.gyro_bias,
+      Eigen::Map<MotionBlock>(Motion(i)) << keyframe.state.v_map_body, keyframe.state.gyro_bias,
           keyframe.state.accel_bias;
       problem_.AddParameterBlock(Pose(i), 7, new RigidManifold);
       problem_.AddParameterBlock(Motion(i), 9);
