@@ -68,11 +68,11 @@ Eigen::Matrix4d UnobservableInformation(const Eigen::Matrix<double, 15, 15>& cov
   return N.transpose() * covariance.llt().solve(N);
 }
 
-// Uses the last keyframe of each ride: rides are independent, keyframes of one ride are not.
-TEST(EstimatorConsistency, KeyframesAreAsGoodAsTheirCovarianceSays) {
+// NEES of the last keyframe of each ride: rides are independent, keyframes of one ride are not.
+struct NeesOfLast {
   NeesOfRides position, yaw, tilt, velocity, gyro_bias, accel_bias, edges;
-  for (const Ride& ride : ShortRides(40, {})) {
-    ASSERT_GT(ride.finished.size(), 4u) << "seed " << ride.world.options().seed;
+
+  void Add(const Ride& ride) {
     const std::vector<ImuState> truth = TruthOf(ride);
     const FinishedKeyframe& last = ride.finished.back();
     const auto& P = last.covariance;
@@ -86,13 +86,21 @@ TEST(EstimatorConsistency, KeyframesAreAsGoodAsTheirCovarianceSays) {
     accel_bias.Add(e.segment<3>(kAccelBias), P.block<3, 3>(kAccelBias, kAccelBias));
     edges.Add(EdgeErrorOf(last, truth[truth.size() - 2], truth.back()), last.edge->covariance);
   }
-  position.ExpectHonest("position");
-  yaw.ExpectHonest("yaw");
-  tilt.ExpectHonest("tilt");
-  velocity.ExpectHonest("velocity");
-  gyro_bias.ExpectHonest("gyro bias");
-  accel_bias.ExpectHonest("accelerometer bias");
-  edges.ExpectHonest("edges");
+};
+
+TEST(EstimatorConsistency, KeyframesAreAsGoodAsTheirCovarianceSays) {
+  NeesOfLast nees;
+  for (const Ride& ride : ShortRides(40, {})) {
+    ASSERT_GT(ride.finished.size(), 4u) << "seed " << ride.world.options().seed;
+    nees.Add(ride);
+  }
+  nees.position.ExpectHonest("position");
+  nees.yaw.ExpectHonest("yaw");
+  nees.tilt.ExpectHonest("tilt");
+  nees.velocity.ExpectHonest("velocity");
+  nees.gyro_bias.ExpectHonest("gyro bias");
+  nees.accel_bias.ExpectHonest("accelerometer bias");
+  nees.edges.ExpectHonest("edges");
 }
 
 // Position and yaw are not observable: no keyframe may have more information on them than the
@@ -115,24 +123,17 @@ TEST(EstimatorConsistency, PositionAndYawAreNeverBetterKnownThanAtTheStart) {
 // Without the states of the intrinsics, NEES / dimension is 5 for the accelerometer's bias, and 2.7
 // for tilt and edges.
 TEST(EstimatorConsistency, AnImuWithWrongIntrinsicsIsBelievedNoMore) {
-  NeesOfRides tilt, velocity, accel_bias, edges;
+  NeesOfLast nees;
   VioTestWorldOptions options;
   options.imu_noise = ImuNoise{};
   for (const Ride& ride : ShortRides(20, options)) {
     ASSERT_GT(ride.finished.size(), 4u) << "seed " << ride.world.options().seed;
-    const std::vector<ImuState> truth = TruthOf(ride);
-    const FinishedKeyframe& last = ride.finished.back();
-    const auto& P = last.covariance;
-    const auto e = ErrorOf(last, truth.back());
-    tilt.Add(e.segment<2>(kTheta), P.block<2, 2>(kTheta, kTheta));
-    velocity.Add(e.segment<3>(kVelocity), P.block<3, 3>(kVelocity, kVelocity));
-    accel_bias.Add(e.segment<3>(kAccelBias), P.block<3, 3>(kAccelBias, kAccelBias));
-    edges.Add(EdgeErrorOf(last, truth[truth.size() - 2], truth.back()), last.edge->covariance);
+    nees.Add(ride);
   }
-  tilt.ExpectHonest("tilt with a wrong IMU");
-  velocity.ExpectHonest("velocity with a wrong IMU");
-  accel_bias.ExpectHonest("accelerometer bias with a wrong IMU");
-  edges.ExpectHonest("edges with a wrong IMU");
+  nees.tilt.ExpectHonest("tilt with a wrong IMU");
+  nees.velocity.ExpectHonest("velocity with a wrong IMU");
+  nees.accel_bias.ExpectHonest("accelerometer bias with a wrong IMU");
+  nees.edges.ExpectHonest("edges with a wrong IMU");
 }
 
 // A phone with a rolling shutter in a shaking hand: its rotation rate changes during the read-out.
@@ -140,20 +141,14 @@ TEST(EstimatorConsistency, RowsThatAccelerateAreBelievedNoMore) {
   VioTestWorldOptions options;
   options.readout_s = 0.03;
   options.shake_radps2 = 15;
-  NeesOfRides tilt, velocity, edges;
+  NeesOfLast nees;
   for (const Ride& ride : ShortRides(20, options)) {
     ASSERT_GT(ride.finished.size(), 4u) << "seed " << ride.world.options().seed;
-    const std::vector<ImuState> truth = TruthOf(ride);
-    const FinishedKeyframe& last = ride.finished.back();
-    const auto& P = last.covariance;
-    const auto e = ErrorOf(last, truth.back());
-    tilt.Add(e.segment<2>(kTheta), P.block<2, 2>(kTheta, kTheta));
-    velocity.Add(e.segment<3>(kVelocity), P.block<3, 3>(kVelocity, kVelocity));
-    edges.Add(EdgeErrorOf(last, truth[truth.size() - 2], truth.back()), last.edge->covariance);
+    nees.Add(ride);
   }
-  tilt.ExpectHonest("tilt with rows that accelerate");
-  velocity.ExpectHonest("velocity with rows that accelerate");
-  edges.ExpectHonest("edges with rows that accelerate");
+  nees.tilt.ExpectHonest("tilt with rows that accelerate");
+  nees.velocity.ExpectHonest("velocity with rows that accelerate");
+  nees.edges.ExpectHonest("edges with rows that accelerate");
 }
 
 // An uncalibrated phone: an unknown lens, and an IMU whose errors are six times as large as stated.
