@@ -13,6 +13,7 @@
 #include "messages/channels.h"
 #include "messages/encoding.h"
 #include "messages/messages.h"
+#include "options/command_line.h"
 #include "recording/euroc.h"
 #include "recording/trajectory.h"
 
@@ -110,7 +111,6 @@ int main(int argc, char** argv) {
     pangea::example::Play(arguments);
     return 0;
   } catch (const std::exception& error) {
-    std::cerr << fmt::format("pangea-own-odometry-example: {}\n", error.what());
-    return 1;
+    return pangea::Failed("pangea-own-odometry-example", error);
   }
 }

@@ -72,8 +72,7 @@ Rigid3 Upright(const Rigid3& T_odom_cam, const Vector3d& p_cam) {
 
 // From the first row of a rolling shutter, which the image's time and pose are of, to the pixel's.
 int64_t RowTime_us(const CameraModel& camera, const Vector2d& pixel) {
-  const double row = std::max(0.0, std::min(pixel.y(), camera.height - 1.0));
-  return std::llround(1e6 * camera.RowTime_s(row));
+  return std::llround(1e6 * camera.RowTime_s(std::clamp(pixel.y(), 0.0, camera.height - 1.0)));
 }
 
 // The body's pose at the edit's time or soon after it: the edit's own pose, moved on as the

@@ -36,8 +36,7 @@ void CheckKind(const std::string& path, int fd) {
 
 // Whether the path still names the open file.
 bool Names(const std::string& path, int fd) {
-  struct stat opened {
-  }, named{};
+  struct stat opened = {}, named = {};
   return fstat(fd, &opened) == 0 && stat(path.c_str(), &named) == 0 &&
          opened.st_ino == named.st_ino && opened.st_dev == named.st_dev;
 }

@@ -31,7 +31,7 @@ interface AgentConfig {
 export interface PhonePose {
   /** Time of the image, sensor clock. */
   utime: number;
-  state: 'initialising' | 'tracking' | 'lost';
+  state: "initialising" | "tracking" | "lost";
   /** For people: why the odometry does not track. While it tracks: that the scale is not known, or empty. */
   reason: string;
   /** "agent/openedUtime" of the map whose odom frame this is. */
@@ -49,7 +49,7 @@ export interface PhonePose {
 
 /** The camera of `core/camera_model.h`. */
 export interface AgentCamera {
-  model: 'radial-tangential' | 'equidistant';
+  model: "radial-tangential" | "equidistant";
   width: number;
   height: number;
   intrinsics: [number, number, number, number];
@@ -91,9 +91,9 @@ export interface Others {
 }
 
 export interface SpoolChange {
-  op: 'put' | 'delete';
+  op: "put" | "delete";
   id: string;
-  /** Only with 'put'. */
+  /** Only with "put". */
   bytes?: Uint8Array;
 }
 
@@ -218,8 +218,8 @@ export class PhoneAgent {
   /** Returns the new anchor's id. Throws if the agent did not track that image or a field is out of bounds. */
   placeAnchor(edit: NewAnchor): string {
     const id = this.native.placeAnchor(edit);
-    if (id.startsWith('error: ')) {
-      throw new Error(id.slice('error: '.length));
+    if (id.startsWith("error: ")) {
+      throw new Error(id.slice("error: ".length));
     }
     return id;
   }
