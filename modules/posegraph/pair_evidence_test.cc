@@ -11,8 +11,6 @@ namespace {
 
 constexpr int64_t kMaxCandidates = 600;
 constexpr int kNumNodes = 20;
-const Pose4 kT_0_1{{2, -1, 0.5}, 0.3};
-
 class PairEvidenceTest : public testing::Test {
  protected:
   // The next constraint, between the maps' n-th nodes.

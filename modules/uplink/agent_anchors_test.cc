@@ -3,13 +3,10 @@
 #include <gtest/gtest.h>
 
 #include "messages/testing/test_anchors.h"
+#include "uplink/test_ids.h"
 
 namespace pangea {
 namespace {
-
-constexpr AnchorId kA{1, 1};
-constexpr MapId kMap{1, 1000};
-using Taken = AgentAnchors::Taken;
 
 LinkAnchor Anchor(int64_t number, const AnchorId& id, int64_t revision = 1) {
   return {number, TestAnchor(id, revision, kMap)};
@@ -17,9 +14,9 @@ LinkAnchor Anchor(int64_t number, const AnchorId& id, int64_t revision = 1) {
 
 TEST(AgentAnchors, TheHighestNumberCountsAndAllAreConfirmed) {
   AgentAnchors anchors;
-  EXPECT_EQ(anchors.Take(Anchor(5, kA, 2), 0), Taken::kNew);
-  EXPECT_EQ(anchors.Take(Anchor(4, kA, 1), 0), Taken::kKnown) << "overtaken";
-  EXPECT_EQ(anchors.Take(Anchor(5, kA, 2), 0), Taken::kKnown);
+  EXPECT_EQ(anchors.Take(Anchor(5, kA, 2), 0), AgentAnchors::Taken::kNew);
+  EXPECT_EQ(anchors.Take(Anchor(4, kA, 1), 0), AgentAnchors::Taken::kKnown) << "overtaken";
+  EXPECT_EQ(anchors.Take(Anchor(5, kA, 2), 0), AgentAnchors::Taken::kKnown);
   EXPECT_EQ(anchors.TakeReceived(), (std::vector<int64_t>{5, 4, 5}));
   EXPECT_TRUE(anchors.TakeReceived().empty());
   const auto due = anchors.DueAgain(10'000'000);
@@ -32,7 +29,7 @@ TEST(AgentAnchors, AnotherSessionNumbersAnew) {
   anchors.Take(Anchor(900, kA, 1), 0);
   anchors.OnNewSession();
   EXPECT_TRUE(anchors.TakeReceived().empty()) << "numbers of the session before";
-  EXPECT_EQ(anchors.Take(Anchor(1, kA, 2), 0), Taken::kNew);
+  EXPECT_EQ(anchors.Take(Anchor(1, kA, 2), 0), AgentAnchors::Taken::kNew);
 }
 
 TEST(AgentAnchors, AppsAreToldAgain) {
@@ -49,20 +46,20 @@ TEST(AgentAnchors, IsBounded) {
   AgentAnchors anchors;
   int64_t number = 0;
   for (int i = 0; i < static_cast<int>(AgentAnchors::kMaxAnchors); ++i) {
-    ASSERT_EQ(anchors.Take(Anchor(++number, {1, i}), 0), Taken::kNew);
+    ASSERT_EQ(anchors.Take(Anchor(++number, {1, i}), 0), AgentAnchors::Taken::kNew);
   }
   EXPECT_EQ(anchors.TakeReceived().size(), kMaxAnchorsReceived);
   const AnchorId another{2, 1};
   EXPECT_FALSE(anchors.MakeRoomFor(another));
-  EXPECT_EQ(anchors.Take(Anchor(++number, another), 0), Taken::kFull);
+  EXPECT_EQ(anchors.Take(Anchor(++number, another), 0), AgentAnchors::Taken::kFull);
   EXPECT_TRUE(anchors.TakeReceived().empty()) << "what is not kept is not confirmed";
   EXPECT_FALSE(anchors.MakeRoomFor({1, 3})) << "it has room";
   // Deleted anchors make room first, then anchors that only an earlier session has sent.
   LinkAnchor gone = Anchor(++number, {1, 7}, 2);
   gone.state.gone = true;
-  EXPECT_EQ(anchors.Take(gone, 0), Taken::kNew);
+  EXPECT_EQ(anchors.Take(gone, 0), AgentAnchors::Taken::kNew);
   EXPECT_EQ(anchors.MakeRoomFor(another)->anchor, (AnchorId{1, 7}));
-  EXPECT_EQ(anchors.Take(Anchor(++number, another), 0), Taken::kNew);
+  EXPECT_EQ(anchors.Take(Anchor(++number, another), 0), AgentAnchors::Taken::kNew);
   anchors.OnNewSession();
   anchors.Take(Anchor(1, {1, 0}), 0);
   EXPECT_EQ(anchors.MakeRoomFor({3, 3})->anchor, (AnchorId{1, 1}));

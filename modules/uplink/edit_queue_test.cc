@@ -3,18 +3,17 @@
 #include <gtest/gtest.h>
 
 #include "messages/testing/test_anchors.h"
+#include "uplink/test_ids.h"
 
 namespace pangea {
 namespace {
 
-constexpr AnchorId kA{1, 1}, kB{1, 2};
 constexpr double kPlenty = 1e9;
-using Taken = EditQueue::Taken;
 
 TEST(EditQueue, SendsUntilItIsAnswered) {
   EditQueue queue(kPlenty);
-  EXPECT_EQ(queue.Add(TestEdit(kA, 1, 1)), Taken::kNew);
-  EXPECT_EQ(queue.Add(TestEdit(kB, 5, 1)), Taken::kNew);
+  EXPECT_EQ(queue.Add(TestEdit(kA, 1, 1)), EditQueue::Taken::kNew);
+  EXPECT_EQ(queue.Add(TestEdit(kB, 5, 1)), EditQueue::Taken::kNew);
   EXPECT_EQ(queue.Next(1'000'000)->anchor, kA);
   EXPECT_EQ(queue.Next(1'000'000)->anchor, kB);
   EXPECT_FALSE(queue.Next(1'100'000));
@@ -30,10 +29,10 @@ TEST(EditQueue, TheNewestRevisionStands) {
   EditQueue queue(kPlenty);
   queue.Add(TestEdit(kA, 3, 1));
   EXPECT_EQ(queue.Next(0)->revision, 3);
-  EXPECT_EQ(queue.Add(TestEdit(kA, 3, 1)), Taken::kOutdated);
-  EXPECT_EQ(queue.Add(TestEdit(kA, 2, 1)), Taken::kOutdated);
+  EXPECT_EQ(queue.Add(TestEdit(kA, 3, 1)), EditQueue::Taken::kOutdated);
+  EXPECT_EQ(queue.Add(TestEdit(kA, 2, 1)), EditQueue::Taken::kOutdated);
   EXPECT_FALSE(queue.Next(1));
-  EXPECT_EQ(queue.Add(TestEdit(kA, 4, 1)), Taken::kNew);
+  EXPECT_EQ(queue.Add(TestEdit(kA, 4, 1)), EditQueue::Taken::kNew);
   EXPECT_EQ(queue.Next(2)->revision, 4) << "at once";
   EXPECT_FALSE(queue.OnAnswer({kA, 3, true}));
   EXPECT_EQ(queue.waiting(), 1u);
@@ -64,10 +63,10 @@ TEST(EditQueue, WhatReplacesAnEditKeepsItsPlace) {
 TEST(EditQueue, IsBounded) {
   EditQueue queue(kPlenty);
   for (int i = 0; i < static_cast<int>(EditQueue::kMaxEdits); ++i) {
-    ASSERT_EQ(queue.Add(TestEdit({1, i}, 1, 1)), Taken::kNew);
+    ASSERT_EQ(queue.Add(TestEdit({1, i}, 1, 1)), EditQueue::Taken::kNew);
   }
-  EXPECT_EQ(queue.Add(TestEdit({1, 1'000'000}, 1, 1)), Taken::kFull);
-  EXPECT_EQ(queue.Add(TestEdit({1, 3}, 2, 1)), Taken::kNew) << "takes no room";
+  EXPECT_EQ(queue.Add(TestEdit({1, 1'000'000}, 1, 1)), EditQueue::Taken::kFull);
+  EXPECT_EQ(queue.Add(TestEdit({1, 3}, 2, 1)), EditQueue::Taken::kNew) << "takes no room";
   EXPECT_EQ(queue.waiting(), EditQueue::kMaxEdits);
 }
 

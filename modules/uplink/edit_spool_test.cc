@@ -9,13 +9,14 @@
 #include "files/testing/full_disk.h"
 #include "messages/encoding.h"
 #include "messages/testing/test_anchors.h"
+#include "uplink/test_ids.h"
 
 namespace pangea {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr AnchorId kA{1, 1}, kB{1, 2}, kOfAnother{2, 7};
+constexpr AnchorId kOfAnother{2, 7};
 
 class EditSpoolTest : public testing::Test {
  protected:

@@ -2,10 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include "uplink/test_ids.h"
+
 namespace pangea {
 namespace {
 
-const MapId kMap{1, 10};
 constexpr int64_t kFrame_us = 50'000;
 
 Rigid3 Pose(double s) { return {ExpSo3({0, 0, 0.1 * s}), {s, 2 * s, 0}}; }

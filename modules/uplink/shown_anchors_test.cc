@@ -6,13 +6,11 @@
 #include <random>
 
 #include "messages/testing/test_anchors.h"
+#include "uplink/test_ids.h"
 
 namespace pangea {
 namespace {
 
-constexpr AnchorId kA{1, 1}, kB{1, 2};
-constexpr MapId kMap{1, 1000}, kLaterMap{1, 2000};
-constexpr int64_t kSecond = 1'000'000;
 constexpr double kMaxStep = 0.013, kMaxRotation = 0.0101;
 
 AnchorState At(const Eigen::Vector3d& t, double angle = 0) {

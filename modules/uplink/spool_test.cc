@@ -11,6 +11,7 @@
 #include "files/testing/full_disk.h"
 #include "messages/encoding.h"
 #include "messages/testing/test_keyframes.h"
+#include "uplink/test_ids.h"
 #include "uplink/thin.h"
 
 namespace pangea {
@@ -18,7 +19,6 @@ namespace {
 
 namespace fs = std::filesystem;
 constexpr int64_t kLarge = 1 << 30;
-const MapId kMap{1, 1000};
 
 class SpoolTest : public testing::Test {
  protected:

@@ -8,11 +8,10 @@
 #include <map>
 #include <set>
 
+#include "uplink/test_ids.h"
+
 namespace pangea {
 namespace {
-
-constexpr int64_t kSecond = 1'000'000;
-const MapId kMap{1, 1000};
 
 LinkAck Ack(int64_t number, int32_t journalled, const MapId& map = kMap) {
   LinkAck ack;

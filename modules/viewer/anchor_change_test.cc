@@ -7,8 +7,6 @@
 namespace pangea::viewer {
 namespace {
 
-const MapId kOne = TestMap(1);
-const MapId kTwo = TestMap(2);
 constexpr int64_t kNow = 1'800'000'000'000'000;
 
 // Two agents that are one group: on y = 0 and on y = 10, keyframes 0 to 9 at x = seq. Rotated

@@ -6,13 +6,13 @@
 #include <functional>
 #include <string>
 
+#include "viewer/viewer_test_world.h"
+
 namespace pangea::viewer {
 namespace {
 
 using testing::IsEmpty;
 using testing::SizeIs;
-
-constexpr int64_t kSecond = 1'000'000;
 
 AnchorEdit EditWith(int64_t n, int64_t revision) {
   AnchorEdit edit;

@@ -18,9 +18,6 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::SizeIs;
 
-constexpr int64_t kStart = 1'700'000'000'000'000;
-constexpr int64_t kSecond = 1'000'000;
-
 TEST(AnchorsOfALog, AreShownAsTheyWereAtTheTime) {
   const std::string path = testing::TempDir() + "viewer_anchors.lcm";
   {

@@ -26,8 +26,6 @@ namespace {
 using testing::SizeIs;
 
 const std::string kLog = std::string(PANGEA_SOURCE_DIR) + "/logs/two_walks/session.lcm";
-constexpr int64_t kStart = 1'700'000'000'000'000;
-
 class LogShowTest : public testing::Test {
  protected:
   LogShow show_{kLog};

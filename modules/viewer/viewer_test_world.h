@@ -9,6 +9,9 @@ namespace pangea::viewer {
 
 // The first map of an agent.
 MapId TestMap(int32_t agent_id);
+inline const MapId kOne = TestMap(1), kTwo = TestMap(2);
+constexpr int64_t kSecond = 1'000'000;               // microseconds
+constexpr int64_t kStart = 1'700'000'000 * kSecond;  // Unix time, microseconds
 // Its x grows by one metre with each seq; it has one point two metres ahead.
 ShownKeyframe TestKeyframe(const MapId& map, int32_t seq);
 // All keyframes of the maps up to `highest_seq`, each map shifted to y = 10 times its index.

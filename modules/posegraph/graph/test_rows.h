@@ -37,6 +37,9 @@ inline GraphMaps MakeRows(int num_maps, int num_keyframes) {
   return maps;
 }
 
+// Where map 1 stands in map 0.
+inline const Pose4 kT_0_1{{2, -1, 0.5}, 0.3};
+
 // The exact constraint if T is the pose of to's odom frame in from's odom frame.
 inline Constraint MakeConstraint(const KeyframeId& from, const KeyframeId& to, const Pose4& T) {
   Constraint constraint;

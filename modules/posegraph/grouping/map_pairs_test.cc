@@ -7,8 +7,6 @@
 namespace pangea {
 namespace {
 
-const Pose4 kT_0_1{{2, -1, 0.5}, 0.3};
-
 // Merges maps 0 and 1 by three viewpoints.
 std::vector<Loop> MergingLoops(const GraphMaps& maps) {
   std::vector<Loop> loops;

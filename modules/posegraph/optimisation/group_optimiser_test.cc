@@ -7,8 +7,6 @@
 namespace pangea {
 namespace {
 
-const Pose4 kT_0_1{{2, -1, 0.5}, 0.3};
-
 // Two merged maps that have not been solved yet.
 struct MergedMaps {
   MergedMaps() {

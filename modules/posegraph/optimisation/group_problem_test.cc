@@ -7,8 +7,6 @@
 namespace pangea {
 namespace {
 
-const Pose4 kT_0_1{{2, -1, 0.5}, 0.3};
-
 // Two maps whose loops are at their keyframes 2, 4, 6; the second lies a little off.
 struct TwoMaps {
   TwoMaps() {

@@ -10,7 +10,6 @@ using testing::ElementsAre;
 using testing::IsEmpty;
 using testing::SizeIs;
 
-constexpr int64_t kSecond = 1'000'000;
 const MapId kMap = {1, 5};
 
 // Landmarks `from` .. `to`, each a pixel further right with every keyframe.

@@ -9,9 +9,6 @@ namespace {
 
 using testing::SizeIs;
 
-const MapId kOne = TestMap(1);
-const MapId kTwo = TestMap(2);
-
 TEST(SceneAnchors, ARepetitionChangesNothingAndAMoveDoes) {
   Scene scene;
   AnchorState anchor = TestAnchor(3, kOne);

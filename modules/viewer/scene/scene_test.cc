@@ -11,9 +11,6 @@ namespace {
 using testing::ElementsAre;
 using testing::SizeIs;
 
-const MapId kOne = TestMap(1);
-const MapId kTwo = TestMap(2);
-
 // The kinds of what changed after a version, in order.
 std::vector<ItemKind> ChangedAfter(const Scene& scene, uint64_t version) {
   std::vector<ItemKind> kinds;

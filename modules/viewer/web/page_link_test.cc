@@ -13,9 +13,6 @@ namespace {
 
 using nlohmann::json;
 
-const MapId kOne = TestMap(1);
-const MapId kTwo = TestMap(2);
-
 uint32_t WordAt(const std::vector<uint8_t>& bytes, size_t at) {
   uint32_t word = 0;
   std::memcpy(&word, bytes.data() + at, sizeof(word));

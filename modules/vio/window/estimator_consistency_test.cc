@@ -114,7 +114,9 @@ TEST(EstimatorConsistency, PositionAndYawAreNeverBetterKnownThanAtTheStart) {
     for (size_t k = 0; k < ride.finished.size(); ++k) {
       const Eigen::Matrix4d gained =
           UnobservableInformation(ride.finished[k].covariance) - at_start;
-      EXPECT_LT(gained.eigenvalues().real().maxCoeff(), 1e-3 * at_start.diagonal().minCoeff())
+      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> of_gained(gained,
+                                                                     Eigen::EigenvaluesOnly);
+      EXPECT_LT(of_gained.eigenvalues().maxCoeff(), 1e-3 * at_start.diagonal().minCoeff())
           << "seed " << seed << ", keyframe " << k;
     }
   }
