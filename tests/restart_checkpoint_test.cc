@@ -14,12 +14,12 @@
 #include <utility>
 #include <vector>
 
-#include "bus/retransmission/journal_reader.h"
 #include "bus/status_log.h"
 #include "checkpoint/checkpoint_file.h"
 #include "fusion/fusion_process.h"
 #include "global_ba/global_ba_process.h"
 #include "inter_map_ba/inter_map_ba_process.h"
+#include "journal_follower/journal_reader.h"
 #include "log_file/log_reader.h"
 #include "log_file/log_writer.h"
 #include "map_points/map_points_process.h"

@@ -6,7 +6,7 @@
 
 #include "anchors/anchors_process.h"
 #include "anchors/api/anchors_server.h"
-#include "bus/process_main.h"
+#include "server_process/process_main.h"
 
 // KEYFRAME_*, MAP_STATE, CORRECTION_*, POSE_*, ANCHOR_EDIT --> AnchorsProcess --> ANCHOR_k, ANCHOR,
 //                                                                                 OTHERS_k

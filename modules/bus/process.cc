@@ -5,8 +5,6 @@
 #include <atomic>
 #include <csignal>
 
-#include "bus/retransmission/journal_first.h"
-
 namespace pangea {
 namespace {
 
@@ -40,14 +38,15 @@ void UseOneThread() {
   }
 }
 
-int RunProcess(LcmBus& bus, Process& process, JournalFirstBus* journal_first) {
+int RunProcess(LcmBus& bus, Process& process,
+               const std::function<void(int64_t now_utime)>& between_messages) {
   InstallSignalHandlers();
   int64_t next_tick = 0;
   while (!StopRequested()) {
     bus.Handle(process.longest_wait_ms());
     const int64_t now = WallUtime();
-    if (journal_first != nullptr) {
-      journal_first->Poll(now);
+    if (between_messages) {
+      between_messages(now);
     }
     if (now >= next_tick) {
       process.Tick(now);

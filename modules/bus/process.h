@@ -3,6 +3,7 @@
 // The main loop around a process class: messages, ticks, signals.
 
 #include <cstdint>
+#include <functional>
 
 #include "bus/bus.h"
 #include "bus/wall_clock.h"
@@ -32,9 +33,9 @@ int StopSignals();  // number of such signals so far
 // with OMP_NUM_THREADS=1, because it asks OpenMP for four. Call this at the start of a program.
 void UseOneThread();
 
-class JournalFirstBus;
-
-// Handles messages and ticks until a signal; returns the exit code. `journal_first` may be null.
-int RunProcess(LcmBus& bus, Process& process, JournalFirstBus* journal_first = nullptr);
+// Handles messages and ticks until a signal; returns the exit code. `between_messages`, unless
+// empty, is called before the process' own Tick and BetweenMessages.
+int RunProcess(LcmBus& bus, Process& process,
+               const std::function<void(int64_t now_utime)>& between_messages = {});
 
 }  // namespace pangea

@@ -23,11 +23,11 @@
 
 #include "bus/node.h"
 #include "bus/process.h"
-#include "bus/retransmission/journal_follower.h"
 #include "cluster/journal_shipper.h"
 #include "cluster/site_lease.h"
 #include "cluster/site_streams.h"
 #include "core/server_messages.h"
+#include "journal_follower/journal_follower.h"
 #include "messages/catch_up_messages.h"
 
 namespace pangea {

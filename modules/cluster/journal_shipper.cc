@@ -9,8 +9,8 @@
 #include <fstream>
 #include <thread>
 
-#include "bus/retransmission/journal_reader.h"
 #include "files/whole_file.h"
+#include "journal_follower/journal_reader.h"
 #include "log_file/checked_scan.h"
 #include "log_file/checksums.h"
 #include "messages/channels.h"

@@ -11,11 +11,11 @@
 #include <thread>
 
 #include "bus/process.h"
-#include "bus/retransmission/journal_first.h"
 #include "bus/status_log.h"
 #include "cluster/core_bridge.h"
 #include "cluster/standby.h"
 #include "cluster/worker_bridge.h"
+#include "journal_follower/journal_first.h"
 
 namespace pangea {
 namespace {
@@ -71,7 +71,7 @@ int RunCore(const BridgeArguments& arguments, SiteStreams& streams, bool waits) 
   LcmBus bus(arguments.bus);
   JournalFirstBus journal_first(bus, WallUtime());
   CoreBridge core(journal_first, streams, lease);
-  const int code = RunProcess(bus, core, &journal_first);
+  const int code = RunProcess(bus, core, [&](int64_t now) { journal_first.Poll(now); });
   lease.Release();
   return code;
 }

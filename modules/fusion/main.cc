@@ -1,5 +1,5 @@
-#include "bus/process_main.h"
 #include "fusion/fusion_process.h"
+#include "server_process/process_main.h"
 
 // KEYFRAME_*, PLACE_MATCH --> FusionProcess --> CONSTRAINT
 int main(int argc, char** argv) {

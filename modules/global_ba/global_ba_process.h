@@ -18,8 +18,8 @@
 
 #include "bus/node.h"
 #include "bus/process.h"
-#include "bus/retransmission/journal_follower.h"
 #include "global_ba/global_ba.h"
+#include "journal_follower/journal_follower.h"
 #include "messages/catch_up_messages.h"
 #include "messages/state_chunks.h"
 #include "pangea/map_state_t.hpp"

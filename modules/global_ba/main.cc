@@ -1,5 +1,5 @@
-#include "bus/process_main.h"
 #include "global_ba/global_ba_process.h"
+#include "server_process/process_main.h"
 
 // KEYFRAME_*, PLACE_MATCH, CONSTRAINT, MAP_STATE --> GlobalBaProcess --> REFINEMENT
 int main(int argc, char** argv) {

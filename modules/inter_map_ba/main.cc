@@ -1,5 +1,5 @@
-#include "bus/process_main.h"
 #include "inter_map_ba/inter_map_ba_process.h"
+#include "server_process/process_main.h"
 
 // KEYFRAME_*, PLACE_MATCH --> InterMapBaProcess --> CONSTRAINT
 int main(int argc, char** argv) {

@@ -33,7 +33,7 @@
 #include "bus/bus.h"
 #include "bus/node.h"
 #include "bus/process.h"
-#include "bus/retransmission/journal_follower.h"
+#include "journal_follower/journal_follower.h"
 #include "loop_verification/loop_verifier.h"
 #include "messages/catch_up_messages.h"
 

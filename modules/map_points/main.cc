@@ -1,5 +1,5 @@
-#include "bus/process_main.h"
 #include "map_points/map_points_process.h"
+#include "server_process/process_main.h"
 
 // KEYFRAME_*, MAP_STATE, REFINEMENT, POSE_* --> MapPointsProcess --> LANDMARKS_k
 int main(int argc, char** argv) {

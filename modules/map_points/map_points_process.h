@@ -12,7 +12,7 @@
 
 #include "bus/node.h"
 #include "bus/process.h"
-#include "bus/retransmission/journal_follower.h"
+#include "journal_follower/journal_follower.h"
 #include "map_points/map_points.h"
 #include "messages/state_chunks.h"
 #include "pangea/map_state_t.hpp"

@@ -1,5 +1,5 @@
-#include "bus/process_main.h"
 #include "place_recognition/place_recognition_process.h"
+#include "server_process/process_main.h"
 
 // KEYFRAME_*, MAP_STATE, HAVE --> PlaceRecognitionProcess --> PLACE_MATCH
 int main(int argc, char** argv) {

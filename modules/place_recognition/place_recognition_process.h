@@ -22,7 +22,7 @@
 
 #include "bus/node.h"
 #include "bus/process.h"
-#include "bus/retransmission/journal_follower.h"
+#include "journal_follower/journal_follower.h"
 #include "messages/catch_up_messages.h"
 #include "place_recognition/place_recognition.h"
 

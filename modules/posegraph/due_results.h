@@ -9,9 +9,9 @@
 #include <set>
 
 #include "bus/node.h"
-#include "bus/retransmission/journal_follower.h"
 #include "core/byte_record.h"
 #include "core/server_messages.h"
+#include "journal_follower/journal_follower.h"
 
 namespace pangea {
 

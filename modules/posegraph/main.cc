@@ -1,7 +1,7 @@
 #include <memory>
 
-#include "bus/process_main.h"
 #include "posegraph/posegraph_process.h"
+#include "server_process/process_main.h"
 
 // KEYFRAME_*, CONSTRAINT, PLACE_MATCH, REFINEMENT --> PoseGraphProcess --> CORRECTION_*, MAP_STATE
 int main(int argc, char** argv) {

@@ -9,7 +9,7 @@
 #include <string>
 
 #include "agent_handler/agent_handler_process.h"
-#include "bus/retransmission/journal_follower.h"
+#include "journal_follower/journal_follower.h"
 #include "messages/channels.h"
 
 namespace pangea {

@@ -8,8 +8,8 @@
 #include <iterator>
 #include <lcm/lcm-cpp.hpp>
 
-#include "bus/retransmission/journal_reader.h"
 #include "files/testing/full_disk.h"
+#include "journal_follower/journal_reader.h"
 #include "log_file/log_event.h"
 
 namespace pangea {

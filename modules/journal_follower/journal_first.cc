@@ -1,4 +1,4 @@
-#include "bus/retransmission/journal_first.h"
+#include "journal_follower/journal_first.h"
 
 #include <utility>
 

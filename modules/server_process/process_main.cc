@@ -1,4 +1,4 @@
-#include "bus/process_main.h"
+#include "server_process/process_main.h"
 
 #include <fmt/format.h>
 
@@ -7,9 +7,9 @@
 #include <filesystem>
 
 #include "bus/options_announcer.h"
-#include "bus/retransmission/journal_first.h"
-#include "bus/retransmission/journal_reader.h"
 #include "bus/status_log.h"
+#include "journal_follower/journal_first.h"
+#include "journal_follower/journal_reader.h"
 #include "messages/channels.h"
 #include "options/command_line.h"
 #include "options/options_arguments.h"
@@ -118,7 +118,7 @@ int ProcessMain(int argc, char** argv, const ProcessDescription& description,
                         OptionsAnnouncer(bus, NameOnTheBus(description.name),
                                          description.options.PrintWithoutHelp()));
     StartLog(description.name, fmt::format("bus {}, {}", url, options.Source()));
-    return RunProcess(bus, process, &journal_first);
+    return RunProcess(bus, process, [&](int64_t now) { journal_first.Poll(now); });
   } catch (const std::exception& error) {
     return Failed(description.name, error);
   }

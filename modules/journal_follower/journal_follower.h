@@ -41,11 +41,11 @@
 
 #include "bus/node.h"
 #include "bus/retransmission/gap_requests.h"
-#include "bus/retransmission/journal_reader.h"
-#include "bus/retransmission/journal_records.h"
 #include "bus/retransmission/missing.h"
 #include "bus/retransmission/reorder_buffer.h"
 #include "checkpoint/checkpoint_file.h"
+#include "journal_follower/journal_reader.h"
+#include "journal_follower/journal_records.h"
 #include "messages/anchor_messages.h"
 #include "messages/catch_up_messages.h"
 #include "pangea/again_t.hpp"

@@ -1,4 +1,4 @@
-#include "bus/retransmission/journal_follower.h"
+#include "journal_follower/journal_follower.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "bus/retransmission/journal_records.h"
+#include "journal_follower/journal_records.h"
 
 #include <fcntl.h>
 #include <sys/stat.h>

@@ -9,8 +9,8 @@
 #include <type_traits>
 
 #include "bus/process.h"
-#include "bus/retransmission/journal_follower.h"
 #include "files/scratch_file.h"
+#include "journal_follower/journal_follower.h"
 #include "options/yaml_options.h"
 
 namespace CLI {

@@ -1,4 +1,4 @@
-#include "bus/retransmission/journal_reader.h"
+#include "journal_follower/journal_reader.h"
 
 #include <fcntl.h>
 #include <sys/stat.h>

@@ -5,8 +5,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "bus/retransmission/journal_follower.h"
 #include "bus/status_log.h"
+#include "journal_follower/journal_follower.h"
 
 namespace pangea {
 

@@ -1,6 +1,6 @@
 // Tests how a follower reads the journal's file. journal_follower_test.cc tests how it follows the
 // bus.
-#include "bus/retransmission/journal_reader.h"
+#include "journal_follower/journal_reader.h"
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -13,8 +13,8 @@
 #include <string>
 #include <vector>
 
-#include "bus/retransmission/journal_follower.h"
 #include "bus/retransmission/timeouts.h"
+#include "journal_follower/journal_follower.h"
 #include "log_file/checksums.h"
 #include "messages/channels.h"
 #include "messages/encoding.h"
