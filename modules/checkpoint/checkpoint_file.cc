@@ -11,7 +11,7 @@
 #include <cstring>
 #include <stdexcept>
 
-#include "files/whole_file.h"
+#include "files/disk_io.h"
 
 namespace pangea {
 namespace {
@@ -26,24 +26,6 @@ constexpr int64_t kTailBytes = sizeof(int64_t) + sizeof(uint32_t);
 
 uint32_t Checksum(uint32_t of_bytes_before, const std::vector<uint8_t>& bytes) {
   return static_cast<uint32_t>(crc32_z(of_bytes_before, bytes.data(), bytes.size()));
-}
-
-// Reads all `size` bytes. False with errno set; errno 0 means the end of the file.
-bool ReadAt(int fd, int64_t offset, void* data, size_t size) {
-  for (auto* at = static_cast<uint8_t*>(data); size > 0;) {
-    const ssize_t count = pread(fd, at, size, offset);
-    if (count < 0 && errno == EINTR) {
-      continue;
-    }
-    if (count <= 0) {
-      errno = count == 0 ? 0 : errno;
-      return false;
-    }
-    at += count;
-    offset += count;
-    size -= static_cast<size_t>(count);
-  }
-  return true;
 }
 
 void Put(const std::string& text, ByteWriter* writer) {
@@ -163,15 +145,15 @@ void CheckpointReader::CheckWhole() {
   std::vector<uint8_t> piece(kBufferBytes);
   for (int64_t at = 0; at < end_; at += static_cast<int64_t>(piece.size())) {
     piece.resize(std::min(piece.size(), static_cast<size_t>(end_ - at)));
-    if (!ReadAt(fd_, at, piece.data(), piece.size())) {
+    if (!ReadFully(fd_, at, piece.data(), piece.size())) {
       throw std::runtime_error(std::strerror(errno));
     }
     computed = Checksum(computed, piece);
   }
   int64_t num_bytes = 0;
   uint32_t written = 0;
-  if (!ReadAt(fd_, end_, &num_bytes, sizeof(num_bytes)) ||
-      !ReadAt(fd_, end_ + static_cast<int64_t>(sizeof(num_bytes)), &written, sizeof(written)) ||
+  if (!ReadFully(fd_, end_, &num_bytes, sizeof(num_bytes)) ||
+      !ReadFully(fd_, end_ + static_cast<int64_t>(sizeof(num_bytes)), &written, sizeof(written)) ||
       num_bytes != end_) {
     throw std::runtime_error("it is torn");
   }
@@ -200,7 +182,7 @@ bool CheckpointReader::Read(void* data, size_t size) {
   const auto buffered = static_cast<int64_t>(buffer_.size());
   if (at_ + static_cast<int64_t>(size) > buffer_at_ + buffered) {
     if (size >= kBufferBytes) {
-      const bool read = ReadAt(fd_, at_, data, size);
+      const bool read = ReadFully(fd_, at_, data, size);
       at_ += static_cast<int64_t>(size);
       buffer_at_ = at_;
       buffer_.clear();
@@ -208,7 +190,7 @@ bool CheckpointReader::Read(void* data, size_t size) {
     }
     buffer_.resize(std::min(kBufferBytes, bytes_left()));
     buffer_at_ = at_;
-    if (!ReadAt(fd_, at_, buffer_.data(), buffer_.size())) {
+    if (!ReadFully(fd_, at_, buffer_.data(), buffer_.size())) {
       return false;
     }
   }

@@ -10,6 +10,8 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "files/disk_io.h"
+
 namespace pangea {
 namespace {
 
@@ -38,25 +40,6 @@ int OpenWithoutName(const std::string& folder) {
   return named;
 }
 
-// Transfers all bytes with pwrite or pread. False with errno set; errno 0 means the end of the
-// file.
-template <typename Operation, typename Byte>
-bool Transfer(Operation operation, int file, int64_t offset, std::span<Byte> bytes) {
-  while (!bytes.empty()) {
-    const ssize_t count = operation(file, bytes.data(), bytes.size(), offset);
-    if (count < 0 && errno == EINTR) {
-      continue;
-    }
-    if (count <= 0) {
-      errno = count == 0 ? 0 : errno;
-      return false;
-    }
-    bytes = bytes.subspan(count);
-    offset += count;
-  }
-  return true;
-}
-
 }  // namespace
 
 ScratchFile::ScratchFile(const ScratchFileOptions& options)
@@ -77,7 +60,7 @@ std::optional<int64_t> ScratchFile::Append(std::span<const uint8_t> record) {
                            max_bytes_ / 1'000'000);
     return std::nullopt;
   }
-  if (!Transfer(pwrite, file_, end_, record)) {
+  if (!WriteFully(file_, end_, record.data(), record.size())) {
     problem_ = fmt::format("the scratch file in {} cannot be written: {}", folder_, Reason());
     return std::nullopt;
   }
@@ -87,7 +70,7 @@ std::optional<int64_t> ScratchFile::Append(std::span<const uint8_t> record) {
 }
 
 bool ScratchFile::Read(int64_t offset, std::span<uint8_t> record) {
-  if (Transfer(pread, file_, offset, record)) {
+  if (ReadFully(file_, offset, record.data(), record.size())) {
     return true;
   }
   problem_ = fmt::format("the scratch file in {} cannot be read: {}", folder_,

@@ -10,6 +10,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "files/disk_io.h"
+
 namespace pangea {
 namespace {
 
@@ -32,9 +34,8 @@ class FileInTheMaking {
       Fail(file, "cannot be written", errno);
     }
     errno = 0;
-    const bool written = fchmod(fd, mode) == 0 &&
-                         write(fd, text.data(), text.size()) == static_cast<ssize_t>(text.size()) &&
-                         fsync(fd) == 0;
+    const bool written =
+        fchmod(fd, mode) == 0 && WriteFully(fd, 0, text.data(), text.size()) && fsync(fd) == 0;
     const int error = errno;
     if (close(fd) != 0 || !written) {
       unlink(path_.c_str());
@@ -52,18 +53,6 @@ class FileInTheMaking {
 };
 
 }  // namespace
-
-void SyncToDisk(const fs::path& path) {
-  const int fd = open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  const bool synced = fd >= 0 && fsync(fd) == 0;
-  const int error = errno;
-  if (fd >= 0) {
-    close(fd);
-  }
-  if (!synced) {
-    Fail(path, "cannot be brought to the disk", error);
-  }
-}
 
 bool WriteNewFile(const fs::path& file, std::string_view text, mode_t mode) {
   const FileInTheMaking made(file, text, mode);

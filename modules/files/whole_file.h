@@ -10,10 +10,6 @@
 
 namespace pangea {
 
-// Returns when all that was written to the file or folder is on the disk. Throws std::runtime_error
-// when it fails.
-void SyncToDisk(const std::filesystem::path& path);
-
 inline constexpr mode_t kOwnerOnly = 0600;  // for keys, invites, images of people
 
 // Writes a new file with this mode. False, and nothing is changed, if the name exists already.

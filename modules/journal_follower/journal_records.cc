@@ -9,6 +9,7 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "files/disk_io.h"
 #include "log_file/log_event.h"
 #include "messages/encoding.h"
 #include "messages/messages.h"

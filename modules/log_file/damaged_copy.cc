@@ -12,6 +12,7 @@
 #include <filesystem>
 #include <stdexcept>
 
+#include "files/disk_io.h"
 #include "log_file/log_event.h"
 
 namespace pangea {
@@ -56,7 +57,7 @@ std::string KeepDamaged(const std::string& file, int fd, const std::vector<FileR
   std::string name = DamagedName(file);
   const int to = open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
   const bool copied = to >= 0 && Copy(fd, parts, to) && fsync(to) == 0 &&
-                      SyncFolder(std::filesystem::absolute(name).parent_path());
+                      TrySyncToDisk(std::filesystem::absolute(name).parent_path());
   const int error = errno;
   if (to >= 0) {
     close(to);

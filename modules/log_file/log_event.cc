@@ -1,12 +1,9 @@
 #include "log_file/log_event.h"
 
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <cerrno>
 
 #include "core/big_endian.h"
+#include "files/disk_io.h"
 
 namespace pangea {
 namespace {
@@ -45,54 +42,12 @@ std::optional<LogEventHeader> ParseLogEventHeader(Bytes bytes) {
                         static_cast<int32_t>(channel_bytes), static_cast<int32_t>(data_bytes)};
 }
 
-bool ReadFully(int fd, int64_t offset, uint8_t* out, size_t size) {
-  while (size > 0) {
-    const ssize_t got = pread(fd, out, size, offset);
-    if (got <= 0) {
-      if (got < 0 && errno == EINTR) {
-        continue;
-      }
-      return false;
-    }
-    out += got;
-    offset += got;
-    size -= static_cast<size_t>(got);
-  }
-  return true;
-}
-
 bool BeginsAsLogEvent(int fd, int64_t offset, int64_t bytes) {
   std::vector<uint8_t> magic;
   PutBigEndian(kLogMagic, 4, &magic);
   std::vector<uint8_t> begin(static_cast<size_t>(std::min<int64_t>(bytes, 4)));
   return ReadFully(fd, offset, begin.data(), begin.size()) &&
          std::equal(begin.begin(), begin.end(), magic.begin());
-}
-
-bool WriteFully(int fd, int64_t offset, const uint8_t* data, size_t size) {
-  while (size > 0) {
-    const ssize_t put = pwrite(fd, data, size, offset);
-    if (put < 0) {
-      if (errno == EINTR) {
-        continue;
-      }
-      return false;
-    }
-    data += put;
-    offset += put;
-    size -= static_cast<size_t>(put);
-  }
-  return true;
-}
-
-bool SyncFolder(const std::string& folder) {
-  const int fd = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (fd < 0) {
-    return false;
-  }
-  const bool synced = fsync(fd) == 0;
-  close(fd);
-  return synced;
 }
 
 }  // namespace pangea

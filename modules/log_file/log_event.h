@@ -31,14 +31,7 @@ size_t AppendLogEvent(int64_t number, int64_t utime, const std::string& channel,
                       std::vector<uint8_t>* out);
 // Nothing if the bytes are not an event's header, or if its lengths are absurd.
 std::optional<LogEventHeader> ParseLogEventHeader(Bytes bytes);
-// Read or write all `size` bytes, and continue after interruptions. False on an error, and when the
-// file ends too early.
-bool ReadFully(int fd, int64_t offset, uint8_t* out, size_t size);
-bool WriteFully(int fd, int64_t offset, const uint8_t* data, size_t size);
 // Whether the `bytes` bytes from `offset` on may be the first bytes of an event. If there are fewer
 // than four, only these are compared.
 bool BeginsAsLogEvent(int fd, int64_t offset, int64_t bytes);
-// Makes sure that new files in the folder survive a power cut; false if this fails.
-bool SyncFolder(const std::string& folder);
-
 }  // namespace pangea

@@ -9,6 +9,8 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "files/disk_io.h"
+
 namespace pangea {
 namespace {
 
@@ -35,7 +37,6 @@ Bytes LogScan::Peek(int64_t offset, size_t size) {
     const auto left = static_cast<size_t>(std::max<int64_t>(file_bytes_ - offset, 0));
     window_.resize(std::min(std::max(size, kReadAhead), left));
     window_offset_ = offset;
-    errno = 0;
     if (!ReadFully(fd_, offset, window_.data(), window_.size())) {
       throw std::runtime_error(errno != 0 ? std::strerror(errno) : "the file has become shorter");
     }

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "core/big_endian.h"
+#include "files/disk_io.h"
 
 namespace pangea {
 namespace {

@@ -12,6 +12,7 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "files/disk_io.h"
 #include "log_file/log_event.h"
 
 namespace pangea::site {

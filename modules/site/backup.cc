@@ -16,8 +16,8 @@
 #include <set>
 #include <stdexcept>
 
+#include "files/disk_io.h"
 #include "files/progress.h"
-#include "files/whole_file.h"
 #include "log_file/log_event.h"
 #include "site/archive_file.h"
 #include "site/site_files.h"

@@ -11,7 +11,7 @@
 #include <stdexcept>
 
 #include "agent_handler/journal/journal.h"
-#include "files/whole_file.h"
+#include "files/disk_io.h"
 #include "log_file/log_reader.h"
 #include "site/journal_contents.h"
 #include "site/journal_writer.h"

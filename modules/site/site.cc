@@ -14,8 +14,8 @@
 
 #include "bus/bus.h"
 #include "bus/bus_url.h"
+#include "files/disk_io.h"
 #include "files/text_file.h"
-#include "files/whole_file.h"
 #include "link/wire.h"
 #include "options/yaml_options.h"
 

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "files/whole_file.h"
+#include "files/disk_io.h"
 
 namespace pangea::site {
 

@@ -9,6 +9,7 @@
 #include <system_error>
 #include <utility>
 
+#include "files/disk_io.h"
 #include "log_file/checked_scan.h"
 #include "log_file/checksums.h"
 #include "log_file/damaged_copy.h"
@@ -141,7 +142,7 @@ void EditSpool::Remove(const AnchorId& anchor, int64_t revision) {
 
 void EditSpool::Sync() {
   if (std::exchange(folder_unsynced_, false)) {
-    SyncFolder(folder_);
+    TrySyncToDisk(folder_);
   }
 }
 

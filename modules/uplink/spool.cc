@@ -13,6 +13,7 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "files/disk_io.h"
 #include "log_file/checksums.h"
 #include "log_file/damaged_copy.h"
 #include "log_file/log_event.h"
@@ -176,7 +177,7 @@ bool Spool::Write(const KeyframeId& id, Bytes data, int64_t utime) {
     }
     segments_[++newest_] = {};
     next_event_ = 0;
-    SyncFolder(folder_);
+    TrySyncToDisk(folder_);
   }
   Segment& segment = segments_.at(newest_);
   std::vector<uint8_t> bytes;

@@ -13,6 +13,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "files/disk_io.h"
 #include "log_file/checksums.h"
 #include "log_file/log_event.h"
 #include "messages/channels.h"
@@ -78,7 +79,7 @@ Journal::Journal(const std::string& path, const Visitor& visitor,
     close(fd_);
     throw;
   }
-  SyncFolder(std::filesystem::absolute(path).parent_path());
+  TrySyncToDisk(std::filesystem::absolute(path).parent_path());
 }
 
 Journal::~Journal() {

@@ -7,6 +7,7 @@
 #include <exception>
 #include <utility>
 
+#include "files/disk_io.h"
 #include "files/whole_file.h"
 #include "site/site.h"
 
@@ -17,17 +18,6 @@ namespace fs = std::filesystem;
 
 constexpr const char* kPart = ".part";
 constexpr const char* kCannotWrite = "the server cannot write it: tell whoever runs it";
-
-bool WriteAll(int fd, Bytes data) {
-  while (!data.empty()) {
-    const ssize_t written = write(fd, data.data(), data.size());
-    if (written <= 0) {
-      return false;
-    }
-    data = data.subspan(static_cast<size_t>(written));
-  }
-  return true;
-}
 
 }  // namespace
 
@@ -100,8 +90,9 @@ std::string RecordingFolder::Begin(int32_t agent_id, int64_t bytes) {
 
 std::string RecordingFolder::Write(int32_t agent_id, Bytes data) {
   Upload& upload = uploads_.at(agent_id);
+  const bool written = WriteFully(upload.fd, upload.written, data.data(), data.size());
   upload.written += static_cast<int64_t>(data.size());
-  return WriteAll(upload.fd, data) ? "" : kCannotWrite;
+  return written ? "" : kCannotWrite;
 }
 
 RecordingStore::Kept RecordingFolder::Finish(int32_t agent_id) {
