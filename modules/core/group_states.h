@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -16,6 +17,12 @@
 #include "core/server_messages.h"
 
 namespace pangea {
+
+// How a new state changes which maps are in one group.
+struct Regrouping {
+  bool fused = false;  // maps that were apart are now together
+  bool split = false;  // maps that were together are now apart
+};
 
 // `State` holds the part of a MapState that the user needs. It has MapState's `revision` and
 // `maps`.
@@ -34,6 +41,30 @@ class GroupStates {
       }
     }
     return taken;
+  }
+
+  // What Take(state) would change; nothing if no map's newest state is older.
+  Regrouping RegroupedBy(const State& state) const {
+    const std::set<MapId> maps(state.maps.begin(), state.maps.end());
+    std::set<const State*> before;  // the states of these maps
+    size_t num_alone = 0;           // maps without a state
+    bool is_newer = false;
+    for (const MapId& map : maps) {
+      const State* const newest = Find(map);
+      is_newer |= newest == nullptr || newest->revision < state.revision;
+      if (newest == nullptr) {
+        ++num_alone;
+      } else {
+        before.insert(newest);
+      }
+    }
+    if (!is_newer) {
+      return {};
+    }
+    const bool split = std::ranges::any_of(newest_, [&](const auto& other) {
+      return before.contains(other.second.get()) && !maps.contains(other.first);
+    });
+    return {before.size() + num_alone > 1, split};
   }
 
   // Null when no state has named the map.
@@ -58,6 +89,12 @@ class GroupStates {
 
  private:
   std::map<MapId, Pointer> newest_;
+};
+
+// The smallest State for GroupStates.
+struct GroupMaps {
+  int64_t revision = 0;
+  std::vector<MapId> maps;
 };
 
 // T_map_body of keyframes, in the map frame of their group.

@@ -7,13 +7,8 @@ namespace {
 
 const MapId kA{1, 100}, kB{2, 200}, kC{3, 300};
 
-struct Maps {
-  int64_t revision = 0;
-  std::vector<MapId> maps;
-};
-
 TEST(GroupStates, TheHighestRevisionOfAMapCountsInAnyOrder) {
-  GroupStates<Maps> groups;
+  GroupStates<GroupMaps> groups;
   EXPECT_EQ(groups.Find(kA), nullptr);
   const auto both = groups.Take({7, {kA, kB}});
   groups.Take({3, {kB}});
@@ -25,7 +20,7 @@ TEST(GroupStates, TheHighestRevisionOfAMapCountsInAnyOrder) {
 }
 
 TEST(GroupStates, IsCurrentUntilOneOfItsMapsHasANewerOne) {
-  GroupStates<Maps> groups;
+  GroupStates<GroupMaps> groups;
   const auto two = groups.Take({1, {kA, kB}});
   EXPECT_TRUE(groups.IsCurrent(*two));
   const auto three = groups.Take({2, {kA, kB, kC}});
@@ -36,14 +31,14 @@ TEST(GroupStates, IsCurrentUntilOneOfItsMapsHasANewerOne) {
 }
 
 TEST(GroupStates, AMapAloneIsNotFused) {
-  GroupStates<Maps> groups;
+  GroupStates<GroupMaps> groups;
   EXPECT_FALSE(groups.IsFused(kA));
   groups.Take({1, {kA}});
   EXPECT_FALSE(groups.IsFused(kA));
 }
 
 TEST(GroupStates, MapsOfOneGroupAreFused) {
-  GroupStates<Maps> groups;
+  GroupStates<GroupMaps> groups;
   groups.Take({1, {kA, kB}});
   EXPECT_TRUE(groups.IsFused(kA));
   EXPECT_TRUE(groups.IsFused(kB));
@@ -51,13 +46,31 @@ TEST(GroupStates, MapsOfOneGroupAreFused) {
 }
 
 TEST(GroupStates, AnUndoneFusionIsNone) {
-  GroupStates<Maps> groups;
+  GroupStates<GroupMaps> groups;
   groups.Take({1, {kA, kB}});
   groups.Take({2, {kA}});
   EXPECT_FALSE(groups.IsFused(kA));
   EXPECT_FALSE(groups.IsFused(kB)) << "no state of its own is needed";
   groups.Take({1, {kA, kB}});
   EXPECT_FALSE(groups.IsFused(kB)) << "an older state came late";
+}
+
+TEST(GroupStates, TellsWhatAStateWouldFuseAndSplit) {
+  GroupStates<GroupMaps> groups;
+  const auto take = [&groups](int64_t revision, const std::vector<MapId>& maps) {
+    const Regrouping regrouping = groups.RegroupedBy({revision, maps});
+    groups.Take({revision, maps});
+    return std::pair(regrouping.fused, regrouping.split);
+  };
+  const std::pair kNothing(false, false), kFused(true, false), kSplit(false, true);
+  EXPECT_EQ(take(1, {kA}), kNothing);
+  EXPECT_EQ(take(2, {kA, kB}), kFused);
+  EXPECT_EQ(take(3, {kA, kB}), kNothing);
+  EXPECT_EQ(take(4, {kC, kA, kB}), kFused);
+  EXPECT_EQ(take(2, {kA, kB}), kNothing) << "it came late";
+  EXPECT_EQ(take(5, {kA}), kSplit);
+  EXPECT_EQ(take(5, {kB, kC}), kNothing) << "they stayed together";
+  EXPECT_EQ(take(6, {kA, kB}), std::pair(true, true));
 }
 
 TEST(PosedGroup, HasThePosesOfTheState) {

@@ -93,10 +93,6 @@ class PlaceRecognition {
     int continued_places;  // checked in addition: near the previous keyframe's matches
     int candidates;        // published at most; each costs a bundle adjustment
   };
-  struct GroupMaps {
-    int64_t revision = 0;
-    std::vector<MapId> maps;
-  };
   static constexpr Limits kOwnMap{.places = 5, .continued_places = 2, .candidates = 3};
   static constexpr Limits kOtherMaps{.places = 8, .continued_places = 3, .candidates = 5};
 

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 
 #include "bus/node.h"
+#include "core/group_states.h"
 #include "core/keyframe.h"
 #include "log_file/log_reader.h"
 #include "messages/anchor_messages.h"
@@ -40,43 +40,22 @@ class States {
     auto whole = chunks_.Add(message.chunk, message.num_chunks, std::move(chunk));
     if (whole) {
       std::ranges::sort(whole->maps);
-      Add(std::make_shared<const MapState>(std::move(*whole)), session_s);
+      NoteChange(*whole, session_s);
+      groups_.Take(std::move(*whole));
     }
   }
+
+  // By map; maps of one group share the state.
+  const std::map<MapId, GroupStates<MapState>::Pointer>& by_map() const { return groups_.by_map(); }
 
   int pending() const { return static_cast<int>(chunks_.pending()); }
 
  private:
-  std::set<MapId> Together(const MapId& map) const {
-    const auto state = session_->states.find(map);
-    std::set<MapId> together = {map};
-    for (const auto& [other, others_state] : session_->states) {
-      if (state != session_->states.end() && others_state == state->second) {
-        together.insert(other);
-      }
-    }
-    return together;
-  }
-
-  void Add(const std::shared_ptr<const MapState>& state, double session_s) {
-    bool fused = false;
-    bool split = false;
-    for (const MapId& map : state->maps) {
-      const std::set<MapId> before = Together(map);
-      fused |= !std::ranges::includes(before, state->maps);
-      split |= !std::ranges::includes(state->maps, before);
-    }
-    bool newest = false;
-    for (const MapId& map : state->maps) {
-      auto& current = session_->states[map];
-      if (current == nullptr || current->revision < state->revision) {
-        current = state;
-        newest = true;
-      }
-    }
-    if (newest && (fused || split)) {
-      GroupChange change{fused, session_s, state->revision, state->group, state->maps, {}};
-      for (const KeyframePose& pose : state->keyframes) {
+  void NoteChange(const MapState& state, double session_s) {
+    const Regrouping regrouping = groups_.RegroupedBy(state);
+    if (regrouping.fused || regrouping.split) {
+      GroupChange change{regrouping.fused, session_s, state.revision, state.group, state.maps, {}};
+      for (const KeyframePose& pose : state.keyframes) {
         auto& utime = change.newest_utime[pose.id.map.agent_id];
         utime = std::max(utime, pose.utime);
       }
@@ -86,6 +65,7 @@ class States {
 
   CapturedSession* session_;
   StateChunks chunks_;
+  GroupStates<MapState> groups_;
 };
 
 void AddPose(Bytes data, PoseTrack* track) {
@@ -232,6 +212,7 @@ CapturedSession ReadServerLog(const std::string& path, LogReadings* readings) {
     }
   };
   ReadLog(path, add, readings);
+  session.states = states.by_map();
   session.incomplete_states = states.pending();
   return session;
 }

@@ -79,18 +79,12 @@ void SessionMonitor::OnMapState(Bytes data) {
   if (!state.value) {
     return;
   }
-  for (const MapId& map : state.value->maps) {
-    auto& [revision, maps] = groups_[map];
-    if (state.value->revision >= revision) {
-      revision = state.value->revision;
-      maps = state.value->maps;
-    }
-  }
+  groups_.Take({state.value->revision, state.value->maps});
   for (auto& [id, progress] : agents_) {
     std::set<int32_t> others;
-    for (const auto& [map, group] : groups_) {
-      if (map.agent_id == id) {
-        for (const MapId& other : group.second) {
+    for (const auto& [map, group] : groups_.by_map()) {
+      if (map.agent_id == id && groups_.IsCurrent(*group)) {
+        for (const MapId& other : group->maps) {
           others.insert(other.agent_id);
         }
       }

@@ -13,6 +13,7 @@
 
 #include "bus/bus.h"
 #include "core/drift.h"
+#include "core/group_states.h"
 #include "pangea/map_id_t.hpp"
 #include "pangea/rigid3_t.hpp"
 #include "pangea/status_t.hpp"
@@ -81,8 +82,7 @@ class SessionMonitor {
   std::map<int32_t, NewestPose> poses_;  // by agent
   std::set<int32_t> with_odometry_;      // agents that publish poses
   std::map<MapId, Drift> drifts_;
-  std::map<MapId, std::pair<int64_t, std::vector<MapId>>>
-      groups_;  // revision and maps, by each map
+  GroupStates<GroupMaps> groups_;
   std::map<std::string, status_t> statuses_;
   std::map<std::string, int64_t> status_received_;  // wall clock
   std::map<std::string, double> cpu_before_s_;      // of starts before the last one

@@ -218,25 +218,14 @@ void Scene::JoinGroup(const MapId& map, const MapId& group, int64_t revision) {
 }
 
 void Scene::NoteGroups(const MapState& state) {
-  const std::set<MapId> now(state.maps.begin(), state.maps.end());
-  bool fused = false;
-  bool split = false;
-  bool newest = false;
-  for (const MapId& map : state.maps) {
-    const auto [known, first] = together_.try_emplace(map, 0, std::set<MapId>{map});
-    auto& [revision, before] = known->second;
-    if (state.revision > revision) {
-      newest = true;
-      fused |= !std::ranges::includes(before, now);
-      split |= !std::ranges::includes(now, before);
-      revision = state.revision;
-      before = now;
-    }
-  }
-  if (newest && (fused || split) && fusions_.size() < kMaxFusions) {
+  GroupMaps group{state.revision, state.maps};
+  std::ranges::sort(group.maps);
+  const Regrouping regrouping = groups_.RegroupedBy(group);
+  if ((regrouping.fused || regrouping.split) && fusions_.size() < kMaxFusions) {
     changes_.Touch({ItemKind::kFusion, static_cast<int64_t>(fusions_.size())});
-    fusions_.push_back({time_s_, fused, {now.begin(), now.end()}});
+    fusions_.push_back({time_s_, regrouping.fused, group.maps});
   }
+  groups_.Take(std::move(group));
 }
 
 void Scene::Take(const ProcessHealth& health) {

@@ -11,7 +11,6 @@
 #include <map>
 #include <memory>
 #include <optional>
-#include <set>
 #include <string>
 #include <unordered_set>
 #include <utility>
@@ -19,6 +18,7 @@
 
 #include "core/anchor.h"
 #include "core/drift.h"
+#include "core/group_states.h"
 #include "core/ids.h"
 #include "core/keyframe.h"
 #include "core/server_messages.h"
@@ -195,7 +195,7 @@ class Scene {
   std::map<int32_t, SceneAgent> agents_;
   std::vector<SceneProcess> processes_;
   std::map<std::string, int> process_index_;
-  std::map<MapId, std::pair<int64_t, std::set<MapId>>> together_;  // revision and maps of the group
+  GroupStates<GroupMaps> groups_;
   std::vector<Fusion> fusions_;
   std::vector<AnchorState> anchors_;
   std::map<AnchorId, int> anchor_index_;
