@@ -263,8 +263,9 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(Named{"place_recognition",
                           Make<PlaceRecognitionProcess, PlaceRecognitionOptions>, "PLACE_MATCH"},
                     Named{"posegraph", MakePoseGraph, "MAP_STATE"},
-                    Named{"fusion", Make<FusionProcess, FusionOptions>, "CONSTRAINT"},
-                    Named{"inter_map_ba", Make<InterMapBaProcess, InterMapBaOptions>, "CONSTRAINT"},
+                    Named{"fusion", Make<FusionProcess, LoopVerifierOptions>, "CONSTRAINT"},
+                    Named{"inter_map_ba", Make<InterMapBaProcess, LoopVerifierOptions>,
+                          "CONSTRAINT"},
                     Named{"global_ba", Make<GlobalBaProcess, GlobalBaOptions>, "REFINEMENT"},
                     Named{"map_points", MakeMapPoints, "LANDMARKS_1"}),
     [](const auto& info) { return info.param.name; });

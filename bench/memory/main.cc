@@ -19,8 +19,8 @@
 #include "anchors/anchors.h"
 #include "bench/process_use.h"
 #include "files/scratch_file.h"
-#include "fusion/fusion.h"
 #include "global_ba/global_ba.h"
+#include "loop_verification/loop_verifier.h"
 #include "map_points/map_points.h"
 #include "messages/encoding.h"
 #include "messages/messages.h"
@@ -118,7 +118,8 @@ std::map<std::string, std::function<Subject()>> Subjects() {
        }},
       {"fusion",
        [] {
-         auto core = std::make_shared<Fusion>(FusionOptions{}, std::make_shared<ScratchFile>());
+         auto core =
+             std::make_shared<LoopVerifier>(LoopVerifierOptions{}, std::make_shared<ScratchFile>());
          return Subject{[core](const Keyframe& keyframe) { core->Add(keyframe); }};
        }},
       {"anchors",

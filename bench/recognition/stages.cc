@@ -6,8 +6,7 @@
 
 #include "bench/recognition/overlap.h"
 #include "eval/metrics.h"
-#include "fusion/fusion.h"
-#include "inter_map_ba/inter_map_ba.h"
+#include "loop_verification/loop_verifier.h"
 #include "place_recognition/place_recognition.h"
 #include "report/metrics/report_truth.h"
 
@@ -118,8 +117,8 @@ class Stages {
   PlaceRecognition recognition_{PlaceRecognitionOptions{}};
   // Every candidate is verified: none is redundant.
   static constexpr KnownConstraintOptions kVerifyAll{.min_gain_bits = 0};
-  InterMapBa intra_{InterMapBaOptions{.alignment = {}, .drift = {}, .redundancy = kVerifyAll}};
-  Fusion inter_{FusionOptions{.alignment = {}, .drift = {}, .redundancy = kVerifyAll}};
+  LoopVerifier intra_{LoopVerifierOptions{.alignment = {}, .drift = {}, .redundancy = kVerifyAll}};
+  LoopVerifier inter_{LoopVerifierOptions{.alignment = {}, .drift = {}, .redundancy = kVerifyAll}};
   std::map<KeyframeId, Known> known_;
   Outcome outcome_;
 };

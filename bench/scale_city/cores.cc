@@ -13,8 +13,8 @@ Cores::Cores(bool recognition_alone, const GlobalBaOptions& global_ba)
   use_.Measure("place_recognition", [&] {
     recognition_ = std::make_unique<PlaceRecognition>(PlaceRecognitionOptions{}, records);
   });
-  inter_map_ba_ = std::make_unique<InterMapBa>(InterMapBaOptions{}, records);
-  fusion_ = std::make_unique<Fusion>(FusionOptions{}, records);
+  inter_map_ba_ = std::make_unique<LoopVerifier>(LoopVerifierOptions{}, records);
+  fusion_ = std::make_unique<LoopVerifier>(LoopVerifierOptions{}, records);
   graph_ = std::make_unique<PoseGraph>(PoseGraphOptions{});
   global_ba_ = std::make_unique<GlobalBa>(global_ba, records);
   map_points_ = std::make_unique<MapPoints>(records);

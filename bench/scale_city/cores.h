@@ -11,9 +11,8 @@
 #include "bench/process_use.h"
 #include "bench/scale_city/city.h"
 #include "core/group_states.h"
-#include "fusion/fusion.h"
 #include "global_ba/global_ba.h"
-#include "inter_map_ba/inter_map_ba.h"
+#include "loop_verification/loop_verifier.h"
 #include "map_points/map_points.h"
 #include "place_recognition/place_recognition.h"
 #include "posegraph/posegraph.h"
@@ -52,8 +51,8 @@ class Cores {
   bool recognition_alone_;
   UseByProcess use_;
   std::unique_ptr<PlaceRecognition> recognition_;
-  std::unique_ptr<InterMapBa> inter_map_ba_;
-  std::unique_ptr<Fusion> fusion_;
+  std::unique_ptr<LoopVerifier> inter_map_ba_;
+  std::unique_ptr<LoopVerifier> fusion_;
   std::unique_ptr<PoseGraph> graph_;
   std::unique_ptr<GlobalBa> global_ba_;
   std::unique_ptr<MapPoints> map_points_;

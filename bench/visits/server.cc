@@ -71,11 +71,11 @@ Server::Server(const Journal& journal) {
     }
   };
   use_.Measure("inter_map_ba", [&] {
-    inter_map_ba_ = std::make_unique<InterMapBa>(InterMapBaOptions{}, records);
+    inter_map_ba_ = std::make_unique<LoopVerifier>(LoopVerifierOptions{}, records);
     all(inter_map_ba_.get());
   });
   use_.Measure("fusion", [&] {
-    fusion_ = std::make_unique<Fusion>(FusionOptions{}, records);
+    fusion_ = std::make_unique<LoopVerifier>(LoopVerifierOptions{}, records);
     all(fusion_.get());
   });
   use_.Measure("posegraph", [&] {

@@ -12,8 +12,7 @@
 #include "bench/process_use.h"
 #include "core/keyframe.h"
 #include "core/server_messages.h"
-#include "fusion/fusion.h"
-#include "inter_map_ba/inter_map_ba.h"
+#include "loop_verification/loop_verifier.h"
 #include "place_recognition/place_recognition.h"
 #include "posegraph/posegraph.h"
 #include "thinning/thinning.h"
@@ -55,8 +54,8 @@ class Server {
   void TellGroups(const PoseGraphUpdate& update);
 
   std::unique_ptr<PlaceRecognition> recognition_;
-  std::unique_ptr<InterMapBa> inter_map_ba_;
-  std::unique_ptr<Fusion> fusion_;
+  std::unique_ptr<LoopVerifier> inter_map_ba_;
+  std::unique_ptr<LoopVerifier> fusion_;
   std::unique_ptr<PoseGraph> graph_;
   UseByProcess use_;
 };

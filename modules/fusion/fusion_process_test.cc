@@ -58,8 +58,8 @@ class VerificationProcesses : public testing::Test {
   }
 
   LocalBus bus_;
-  FusionProcess fusion_{bus_, FusionOptions{}};
-  InterMapBaProcess inter_map_ba_{bus_, InterMapBaOptions{}};
+  FusionProcess fusion_{bus_, LoopVerifierOptions{}};
+  InterMapBaProcess inter_map_ba_{bus_, LoopVerifierOptions{}};
   Node listener_{bus_, "listener"};
   TestAgent agent_m_, agent_c_;
   std::vector<Constraint> constraints_;
@@ -152,7 +152,7 @@ TEST_F(VerificationProcesses, ResultDoesNotDependOnArrival) {
   SendKeyframes(agent_c_, 0, 4);
   ASSERT_EQ(constraints_.size(), 1u);
 
-  Fusion fusion{FusionOptions{}};
+  LoopVerifier fusion{LoopVerifierOptions{}};
   for (const TestAgent* agent : {&agent_c_, &agent_m_}) {
     for (const Keyframe& keyframe : agent->keyframes) {
       // As it comes off the wire, where pixels are rounded.
@@ -313,7 +313,7 @@ TEST(FusionProcess, LiveItListensBeforeItVerifies) {
   const TestAgent agent_m = RunTestAgent(room, first);
   const TestAgent agent_c = RunTestAgent(room, second);
   LcmBus bus("memq://");
-  FusionProcess fusion(bus, FusionOptions{});
+  FusionProcess fusion(bus, LoopVerifierOptions{});
   Node listener(bus, "listener");
   status_t status{};
   std::vector<int32_t> verified;

@@ -1,25 +1,24 @@
 #pragma once
 
+// Loop closures within one map (the paper, section IV.C): verifies candidates of kind intra, with
+// one verification result each. The steps are those of fusion: PnP, then bundle adjustment of the
+// windows up to both keyframes. In addition, the drift that the loop implies must be possible for
+// odometry over that path (drift_gate.h).
+//
 // In: KEYFRAME_*, PLACE_MATCH (candidates of kind intra). Out: CONSTRAINT, STATUS_inter_map_ba.
 
 #include <memory>
 
-#include "inter_map_ba/inter_map_ba.h"
 #include "loop_verification/candidate_process.h"
 
 namespace pangea {
 
 class InterMapBaProcess : public CandidateProcess {
  public:
-  InterMapBaProcess(Bus& bus, const InterMapBaOptions& options,
+  InterMapBaProcess(Bus& bus, const LoopVerifierOptions& options,
                     const std::shared_ptr<RecordStore>& records = nullptr,
                     const CheckpointPlace& checkpoint = {})
-      : CandidateProcess(
-            bus, "inter_map_ba", PlaceKind::kIntra,
-            [&options](const std::shared_ptr<RecordStore>& of_verifier) {
-              return std::make_unique<InterMapBa>(options, of_verifier);
-            },
-            records, checkpoint) {}
+      : CandidateProcess(bus, "inter_map_ba", PlaceKind::kIntra, options, records, checkpoint) {}
 };
 
 }  // namespace pangea

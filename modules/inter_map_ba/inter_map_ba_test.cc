@@ -1,4 +1,4 @@
-#include "inter_map_ba/inter_map_ba.h"
+#include "loop_verification/loop_verifier.h"
 
 #include <gtest/gtest.h>
 
@@ -23,8 +23,9 @@ TestAgent RoundTrip(uint64_t seed, double edge_sigma_m) {
   return RunTestAgent(MakeTestRoom({.seed = seed}), walk);
 }
 
-Constraint Verify(const InterMapBaOptions& options, const TestAgent& agent, int query, int match) {
-  InterMapBa verifier(options);
+Constraint Verify(const LoopVerifierOptions& options, const TestAgent& agent, int query,
+                  int match) {
+  LoopVerifier verifier(options);
   for (const Keyframe& keyframe : agent.keyframes) {
     verifier.Add(keyframe);
   }
@@ -53,7 +54,7 @@ TEST(InterMapBa, ClosesALoopBetterThanOdometry) {
 }
 
 TEST(InterMapBa, RefusesMoreDriftThanOdometryMakes) {
-  InterMapBaOptions options;
+  LoopVerifierOptions options;
   options.drift.max_drift_m = options.drift.max_drift_share = 0;
   const Constraint loop = Verify(options, RoundTrip(30, 0.01), kRound + 10, 11);
   EXPECT_FALSE(loop.accepted);
@@ -68,7 +69,7 @@ TEST(InterMapBa, RefusesNeighbours) {
 
 TEST(InterMapBa, IsReadyOnlyWithTheWholeWay) {
   const TestAgent agent = RoundTrip(32, 0.01);
-  InterMapBa verifier(InterMapBaOptions{});
+  LoopVerifier verifier(LoopVerifierOptions{});
   const PlaceCandidate candidate{agent.keyframes[11].id, PlaceKind::kIntra, 0.5f, {}};
   const KeyframeId query = agent.keyframes[kRound + 10].id;
   for (const Keyframe& keyframe : agent.keyframes) {

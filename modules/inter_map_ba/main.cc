@@ -3,7 +3,7 @@
 
 // KEYFRAME_*, PLACE_MATCH --> InterMapBaProcess --> CONSTRAINT
 int main(int argc, char** argv) {
-  return pangea::ServerProcessMain<pangea::InterMapBaProcess, pangea::InterMapBaOptions>(
+  return pangea::ServerProcessMain<pangea::InterMapBaProcess, pangea::LoopVerifierOptions>(
       argc, argv, "pangea-inter-map-ba",
       "Closes loops: a verification result for every place match within one map");
 }

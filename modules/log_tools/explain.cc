@@ -10,9 +10,8 @@
 #include <stdexcept>
 
 #include "core/median.h"
-#include "fusion/fusion.h"
-#include "inter_map_ba/inter_map_ba.h"
 #include "log_file/log_reader.h"
+#include "loop_verification/loop_verifier.h"
 #include "messages/channels.h"
 #include "messages/encoding.h"
 #include "messages/messages.h"
@@ -99,12 +98,10 @@ std::vector<std::string> NotesOf(const LoggedOptions& logged, const std::string&
 
 std::unique_ptr<LoopVerifier> VerifierOf(PlaceKind kind, const LoggedOptions& logged,
                                          Explanation* explanation) {
-  if (kind == PlaceKind::kIntra) {
-    explanation->options_notes = NotesOf(logged, "inter_map_ba");
-    return std::make_unique<InterMapBa>(logged.options.inter_map_ba);
-  }
-  explanation->options_notes = NotesOf(logged, "fusion");
-  return std::make_unique<Fusion>(logged.options.fusion);
+  const bool intra = kind == PlaceKind::kIntra;
+  explanation->options_notes = NotesOf(logged, intra ? "inter_map_ba" : "fusion");
+  return std::make_unique<LoopVerifier>(intra ? logged.options.inter_map_ba
+                                              : logged.options.fusion);
 }
 
 double Degrees(double radians) { return radians * 180 / std::numbers::pi; }

@@ -39,8 +39,9 @@ void ShowMatches(const Verification& v, LoopVerificationReport* report) {
 }  // namespace
 
 Constraint Aligner::Align(const CandidateKeyframes& keyframes, const PlaceCandidate& candidate,
-                          const LoopVerificationGate& gate, LoopVerificationReport* report) {
-  Verification verification(options_, keyframes, candidate, gate, &windows_);
+                          const std::optional<DriftGate>& drift_gate,
+                          LoopVerificationReport* report) {
+  Verification verification(options_, keyframes, candidate, drift_gate, &windows_);
   verification.guess_tilt_sigma = std::sqrt(TiltVariance(verification.windows, kGuessTiltFloor));
   Constraint constraint;
   constraint.from = candidate.match;

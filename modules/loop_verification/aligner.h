@@ -8,6 +8,7 @@
 // with the reason. The same input gives the same result. Not thread safe.
 
 #include <algorithm>
+#include <optional>
 
 #include "loop_verification/steps/steps.h"
 #include "loop_verification/window_cache.h"
@@ -22,8 +23,10 @@ class Aligner {
   explicit Aligner(LoopVerificationOptions options) : options_(options) {}
 
   // `keyframes`: kNumKeyframes up to the match and up to the query; fewer near the start of a map.
+  // `drift_gate`: only within one map.
   Constraint Align(const CandidateKeyframes& keyframes, const PlaceCandidate& candidate,
-                   const LoopVerificationGate& gate, LoopVerificationReport* report = nullptr);
+                   const std::optional<DriftGate>& drift_gate,
+                   LoopVerificationReport* report = nullptr);
 
  private:
   LoopVerificationOptions options_;

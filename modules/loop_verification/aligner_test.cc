@@ -88,7 +88,7 @@ TEST(AlignerTest, TheTiltIsWeighedAboutItsAxis) {
   const auto frames_c = store.WindowUpTo(c.keyframes[9].id, Aligner::kNumKeyframes);
   LoopVerificationReport report;
   const Constraint constraint = Aligner(options).Align(
-      {frames_m, frames_c, {}}, MakeTestCandidate(c, 9, m, 10, 40, 0), kNoGate, &report);
+      {frames_m, frames_c, {}}, MakeTestCandidate(c, 9, m, 10, 40, 0), std::nullopt, &report);
   ASSERT_TRUE(constraint.accepted) << constraint.reason;
 
   const Eigen::Quaterniond q_m = m.keyframes[10].T_odom_body.q, q_c = c.keyframes[9].T_odom_body.q;
@@ -150,7 +150,7 @@ TEST(AlignerTest, EachBarIsObeyed) {
             "halves of the view: the halves of the view disagree");
 }
 
-TEST(AlignerTest, TheGateOfTheKindIsObeyed) {
+TEST(AlignerTest, TheDriftGateIsObeyed) {
   const auto room = MakeTestRoom({.seed = 8});
   TestAgentOptions walk = FirstAgent(0);
   walk.num_keyframes = 80;
@@ -164,8 +164,8 @@ TEST(AlignerTest, TheGateOfTheKindIsObeyed) {
   const auto align = [&](const DriftGateOptions& options) {
     return Aligner({}).Align(
         {store.WindowUpTo({walk.map, 9}, 5), store.WindowUpTo({walk.map, 76}, 5), {}}, candidate,
-        MakeDriftGate(options, *store.PathBetween({walk.map, 9}, {walk.map, 76}),
-                      agent.keyframes[76].T_odom_body.t));
+        DriftGate(options, *store.PathBetween({walk.map, 9}, {walk.map, 76}),
+                  agent.keyframes[76].T_odom_body.t));
   };
   EXPECT_TRUE(align({}).accepted) << align({}).reason;
   DriftGateOptions none;

@@ -9,8 +9,6 @@
 
 namespace pangea {
 
-inline const LoopVerificationGate kNoGate = [](const Rigid3&) { return std::string(); };
-
 inline Constraint Align(const TestAgent& query_agent, int query, const TestAgent& match_agent,
                         int match, const PlaceCandidate& candidate,
                         const LoopVerificationOptions& options = {},
@@ -25,7 +23,7 @@ inline Constraint Align(const TestAgent& query_agent, int query, const TestAgent
       {store.WindowUpTo(match_agent.keyframes[match].id, Aligner::kNumKeyframes),
        store.WindowUpTo(query_agent.keyframes[query].id, Aligner::kNumKeyframes),
        {}},
-      candidate, kNoGate, report);
+      candidate, std::nullopt, report);
 }
 
 // Options with which windows hold only landmarks with a depth from the odometry.

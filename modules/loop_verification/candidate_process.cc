@@ -21,17 +21,17 @@ constexpr char kJournalOwner[] = "agent_handler";
 }  // namespace
 
 CandidateProcess::CandidateProcess(Bus& bus, const std::string& name, PlaceKind kind,
-                                   const MakeVerifier& make_verifier,
+                                   const LoopVerifierOptions& options,
                                    const std::shared_ptr<RecordStore>& records,
                                    const CheckpointPlace& checkpoint)
     : node_(bus, name),
       kind_(kind),
       records_(std::make_shared<JournalRecords>(records, LoopVerifier::RecordOf)),
-      verifier_(make_verifier(records_)),
+      verifier_(options, records_),
       journal_(node_,
                {.matches = JournalFollower::Which::kAll,
                 .results = JournalFollower::Which::kOfFormerRuns},
-               {.keyframe = [this](Keyframe keyframe) { verifier_->Add(std::move(keyframe)); },
+               {.keyframe = [this](Keyframe keyframe) { verifier_.Add(std::move(keyframe)); },
                 .match = std::bind_front(&CandidateProcess::TakeMatch, this),
                 .result = std::bind_front(&CandidateProcess::OnFormerResult, this),
                 .have = std::bind_front(&CandidateProcess::OnHave, this),
@@ -51,19 +51,19 @@ CandidateProcess::CandidateProcess(Bus& bus, const std::string& name, PlaceKind 
 void CandidateProcess::OnFormerResult(const Constraint& result) {
   const bool of_the_other = result.kind != kind_ && result.kind != PlaceKind::kDerived;
   if (!of_the_other && verified_.insert(result.Id()).second) {
-    verifier_->NoteVerified(result);
+    verifier_.NoteVerified(result);
   }
 }
 
 void CandidateProcess::Save(ByteWriter* writer) const {
   writer->Put(std::vector<int64_t>(verified_.begin(), verified_.end()));
-  verifier_->Save(writer);
+  verifier_.Save(writer);
 }
 
 bool CandidateProcess::Restore(ByteReader* reader) {
   std::vector<int64_t> verified;
   reader->Get(&verified);
-  if (!verifier_->Restore(reader)) {
+  if (!verifier_.Restore(reader)) {
     return false;
   }
   verified_ = {verified.begin(), verified.end()};
@@ -94,7 +94,7 @@ bool CandidateProcess::TakeMatch(const PlaceMatch& match) {
 
 void CandidateProcess::OnHave(const Have& have) {
   for (const SeqGap& gap : have.gaps) {
-    verifier_->NoteLost(gap.map, gap.from_seq, gap.to_seq);
+    verifier_.NoteLost(gap.map, gap.from_seq, gap.to_seq);
   }
 }
 
@@ -118,7 +118,7 @@ void CandidateProcess::OnVerificationRequest(const VerificationRequest& request)
 void CandidateProcess::CollectReady() {
   for (auto it = waiting_.begin(); it != waiting_.end();) {
     const KeyframeId& query = it->first.first;
-    if (verifier_->Ready(query, it->second)) {
+    if (verifier_.Ready(query, it->second)) {
       ready_.emplace_back(query, std::move(it->second));
       it = waiting_.erase(it);
     } else {
@@ -153,7 +153,7 @@ bool CandidateProcess::VerifyNext() {
   ready_.erase(next);
   // The journal may deliver the result of a former run after its match.
   if (!verified_.contains(ConstraintId(query, candidate))) {
-    const Constraint constraint = verifier_->Verify(query, candidate);
+    const Constraint constraint = verifier_.Verify(query, candidate);
     verified_.insert(constraint.Id());
     node_.Publish(std::string(channels::kConstraint), ToMessage(constraint));
     sent_.push_back(constraint);
@@ -183,7 +183,7 @@ void CandidateProcess::PublishStatus(int64_t now_utime) {
       fmt::format("{} constraints accepted of {} candidates, {} wait for keyframes, {} for their "
                   "turn{}",
                   num_accepted_, verified_.size(), waiting_.size(), ready_.size(),
-                  NoteRecords(verifier_->store_counters(), records_.get(), &node_)));
+                  NoteRecords(verifier_.store_counters(), records_.get(), &node_)));
 }
 
 }  // namespace pangea

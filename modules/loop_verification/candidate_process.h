@@ -23,7 +23,6 @@
 
 #include <cstdint>
 #include <deque>
-#include <functional>
 #include <map>
 #include <memory>
 #include <set>
@@ -41,12 +40,9 @@ namespace pangea {
 
 class CandidateProcess : public Process {
  public:
-  using MakeVerifier =
-      std::function<std::unique_ptr<LoopVerifier>(const std::shared_ptr<RecordStore>& records)>;
-
   // `records`: stores keyframes that come over the bus; may be null.
   CandidateProcess(Bus& bus, const std::string& name, PlaceKind kind,
-                   const MakeVerifier& make_verifier, const std::shared_ptr<RecordStore>& records,
+                   const LoopVerifierOptions& options, const std::shared_ptr<RecordStore>& records,
                    const CheckpointPlace& checkpoint);
   void Tick(int64_t now_utime) override;
 
@@ -72,7 +68,7 @@ class CandidateProcess : public Process {
   Node node_;
   PlaceKind kind_;
   std::shared_ptr<JournalRecords> records_;
-  std::unique_ptr<LoopVerifier> verifier_;
+  LoopVerifier verifier_;
   JournalFollower journal_;
   // Candidates that wait for keyframes, by (query, match); and candidates that wait for their turn.
   std::map<std::pair<KeyframeId, KeyframeId>, PlaceCandidate> waiting_;

@@ -4,8 +4,9 @@
 // against look-alikes at the other end of a hall, not an estimate of the drift.
 
 #include <string>
+#include <utility>
 
-#include "loop_verification/steps/verification.h"
+#include "core/rigid3.h"
 
 namespace pangea {
 
@@ -25,10 +26,21 @@ struct DriftGateOptions {
   }
 };
 
-// For two keyframes of one map, `path_m` apart along its odometry. The gate's argument
-// T_odom_m_odom_c is the drift of the odometry from the older keyframe (m) to the newer one (c),
-// which is at `p_odom_c`.
-LoopVerificationGate MakeDriftGate(const DriftGateOptions& options, double path_m,
-                                   const Eigen::Vector3d& p_odom_c);
+// For two keyframes of one map, `path_m` apart along its odometry; the newer one (c) is at
+// `p_odom_c`.
+class DriftGate {
+ public:
+  DriftGate(const DriftGateOptions& options, double path_m, Eigen::Vector3d p_odom_c)
+      : options_(options), path_m_(path_m), p_odom_c_(std::move(p_odom_c)) {}
+
+  // The reason of a refusal, or an empty string. `T_odom_m_odom_c`: drift of the odometry from the
+  // older keyframe (m) to the newer one.
+  std::string Check(const Rigid3& T_odom_m_odom_c) const;
+
+ private:
+  DriftGateOptions options_;
+  double path_m_;
+  Eigen::Vector3d p_odom_c_;
+};
 
 }  // namespace pangea

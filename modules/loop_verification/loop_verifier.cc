@@ -1,5 +1,6 @@
 #include "loop_verification/loop_verifier.h"
 
+#include <optional>
 #include <utility>
 
 namespace pangea {
@@ -50,6 +51,9 @@ bool LoopVerifier::Restore(ByteReader* reader) {
 
 Constraint LoopVerifier::Verify(const KeyframeId& query, const PlaceCandidate& candidate,
                                 LoopVerificationReport* report) {
+  if (candidate.kind == PlaceKind::kIntra && query.map != candidate.match.map) {
+    return RefusedConstraint(query, candidate, "intra, but of two maps");
+  }
   if (known_.IsRedundant(query, candidate.match, store_)) {
     return RefusedConstraint(query, candidate, kRedundant);
   }
@@ -72,7 +76,7 @@ Constraint LoopVerifier::Align(const KeyframeId& query, const PlaceCandidate& ca
       return RefusedConstraint(query, candidate, "a matched corner does not exist");
     }
   }
-  LoopVerificationGate gate = [](const Rigid3&) { return std::string(); };
+  std::optional<DriftGate> drift_gate;
   if (query.map == candidate.match.map) {
     if (keyframes.c.front()->keyframe().id.seq <= candidate.match.seq) {
       return RefusedConstraint(query, candidate, "the two keyframes are neighbours");
@@ -84,9 +88,9 @@ Constraint LoopVerifier::Align(const KeyframeId& query, const PlaceCandidate& ca
     // Only within one map: of another map they may not have arrived, and the result must not depend
     // on that.
     keyframes.after_m = store_.WindowBehind(candidate.match, kKeyframesBehind);
-    gate = MakeDriftGate(drift_, *path_m, keyframes.c.back()->keyframe().T_odom_body.t);
+    drift_gate.emplace(drift_, *path_m, keyframes.c.back()->keyframe().T_odom_body.t);
   }
-  return aligner_.Align(keyframes, candidate, gate, report);
+  return aligner_.Align(keyframes, candidate, drift_gate, report);
 }
 
 }  // namespace pangea

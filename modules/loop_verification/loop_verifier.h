@@ -41,7 +41,6 @@ class LoopVerifier {
         aligner_(options.alignment),
         known_(options.redundancy),
         store_({}, std::move(records)) {}
-  virtual ~LoopVerifier() = default;
 
   // Keyframes may come in any order; a repeat is ignored.
   void Add(Keyframe keyframe) { store_.Add(std::move(keyframe)); }
@@ -54,8 +53,8 @@ class LoopVerifier {
   // Whether all keyframes that the verification needs are here, or lost.
   bool Ready(const KeyframeId& query, const PlaceCandidate& candidate) const;
   // Call only if Ready. Two keyframes of one map must also pass the drift gate.
-  virtual Constraint Verify(const KeyframeId& query, const PlaceCandidate& candidate,
-                            LoopVerificationReport* report = nullptr);
+  Constraint Verify(const KeyframeId& query, const PlaceCandidate& candidate,
+                    LoopVerificationReport* report = nullptr);
 
   // The record of a keyframe, as it is stored in `records`.
   static std::vector<uint8_t> RecordOf(const Keyframe& keyframe) {

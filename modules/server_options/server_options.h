@@ -14,10 +14,9 @@
 #include <vector>
 
 #include "anchors/anchors.h"
-#include "fusion/fusion.h"
 #include "global_ba/global_ba.h"
-#include "inter_map_ba/inter_map_ba.h"
 #include "log_file/log_reading.h"
+#include "loop_verification/loop_verifier.h"
 #include "place_recognition/place_recognition.h"
 #include "posegraph/posegraph.h"
 
@@ -25,8 +24,8 @@ namespace pangea {
 
 struct ServerOptions {
   PlaceRecognitionOptions place_recognition;
-  InterMapBaOptions inter_map_ba;
-  FusionOptions fusion;
+  LoopVerifierOptions inter_map_ba;
+  LoopVerifierOptions fusion;
   PoseGraphOptions posegraph;
   GlobalBaOptions global_ba;
   AnchorsOptions anchors;

@@ -14,8 +14,8 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace pangea;
   fuzz::QuickBus bus;
   PlaceRecognitionProcess place_recognition(bus, PlaceRecognitionOptions{});
-  InterMapBaProcess inter_map_ba(bus, InterMapBaOptions{});
-  FusionProcess fusion(bus, FusionOptions{});
+  InterMapBaProcess inter_map_ba(bus, LoopVerifierOptions{});
+  FusionProcess fusion(bus, LoopVerifierOptions{});
   PoseGraphProcess posegraph(bus, PoseGraphOptions{});
   GlobalBaProcess global_ba(bus, GlobalBaOptions{});
   MapPointsProcess map_points(bus);

@@ -12,12 +12,12 @@ double LoopVerificationReport::Measured(std::string_view option) const {
 }
 
 Verification::Verification(const CommonStepOptions& options, const CandidateKeyframes& keyframes,
-                           const PlaceCandidate& candidate, const LoopVerificationGate& gate,
-                           WindowCache* window_cache)
+                           const PlaceCandidate& candidate,
+                           const std::optional<DriftGate>& drift_gate, WindowCache* window_cache)
     : options(options),
       keyframes(keyframes),
       candidate(candidate),
-      gate(gate),
+      drift_gate(drift_gate),
       window_cache(*window_cache),
       windows{window_cache->Make(LastOfWindow(keyframes.m), options.window, keyframes.after_m),
               window_cache->Make(LastOfWindow(keyframes.c), options.window)} {}
@@ -55,13 +55,16 @@ std::vector<PointMatch> Verification::InlierMatches() const {
   return inliers;
 }
 
-std::string CheckGate(const CommonStepOptions& /*options*/, Verification* verification) {
+std::string CheckDrift(const CommonStepOptions& /*options*/, Verification* verification) {
+  if (!verification->drift_gate) {
+    return "";
+  }
   const auto& [m, c] = verification->windows;
   // A window frame is the odom frame, shifted to the newest keyframe's body.
   const Rigid3 T_odom_m(Eigen::Quaterniond::Identity(), m.newest_keyframe().T_odom_body.t);
   const Rigid3 T_odom_c(Eigen::Quaterniond::Identity(), c.newest_keyframe().T_odom_body.t);
   const Rigid3& T_m_c = verification->ba ? verification->ba->T_m_c : verification->pose.T_m_c;
-  return verification->gate(T_odom_m * T_m_c * T_odom_c.Inverse());
+  return verification->drift_gate->Check(T_odom_m * T_m_c * T_odom_c.Inverse());
 }
 
 }  // namespace pangea

@@ -2,7 +2,6 @@
 
 // The state of one candidate in the steps (steps.h): their common input and their results.
 
-#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -11,6 +10,7 @@
 #include "core/server_messages.h"
 #include "loop_verification/correspondences/match_sets.h"
 #include "loop_verification/correspondences/projection_search.h"
+#include "loop_verification/drift_gate.h"
 #include "loop_verification/joint_ba/joint_ba.h"
 #include "loop_verification/upright_pnp.h"
 #include "loop_verification/window.h"
@@ -50,10 +50,6 @@ struct LoopVerificationReport {
   double Measured(std::string_view option) const;
 };
 
-// A gate supplied by the caller: returns the reason of a refusal, or an empty string.
-// `T_odom_m_odom_c` is the alignment of the two odom frames.
-using LoopVerificationGate = std::function<std::string(const Rigid3& T_odom_m_odom_c)>;
-
 // The keyframes for a verification. They reach further back than the windows.
 struct CandidateKeyframes {
   KeyframeWindow m;        // ends with the match
@@ -63,13 +59,13 @@ struct CandidateKeyframes {
 
 struct Verification {
   Verification(const CommonStepOptions& options, const CandidateKeyframes& keyframes,
-               const PlaceCandidate& candidate, const LoopVerificationGate& gate,
+               const PlaceCandidate& candidate, const std::optional<DriftGate>& drift_gate,
                WindowCache* window_cache);
 
   const CommonStepOptions& options;
   const CandidateKeyframes& keyframes;
   const PlaceCandidate& candidate;
-  const LoopVerificationGate& gate;
+  const std::optional<DriftGate>& drift_gate;  // only within one map
   WindowCache& window_cache;
   WindowPair windows;
   double guess_tilt_sigma = 0;  // radians, of roll and pitch between the windows
@@ -92,7 +88,7 @@ struct Verification {
   std::vector<PointMatch> InlierMatches() const;
 };
 
-// Applies the caller's gate to the present alignment.
-std::string CheckGate(const CommonStepOptions& options, Verification* verification);
+// Applies the drift gate, if there is one, to the present alignment of the two odom frames.
+std::string CheckDrift(const CommonStepOptions& options, Verification* verification);
 
 }  // namespace pangea
