@@ -7,11 +7,13 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "eval/evaluate.h"
 #include "files/csv.h"
 #include "files/text_file.h"
+#include "options/command_line.h"
 #include "recording/euroc.h"
 
-namespace pangea {
+namespace pangea::eval {
 namespace {
 
 void Warn(const std::vector<std::string>& warnings) {
@@ -54,9 +56,29 @@ void Write(const std::string& table, const nlohmann::ordered_json& json, const s
   }
 }
 
-}  // namespace
+class CommandLine {
+ public:
+  // Adds its subcommands to `app`, which must outlive it. Call Run after parsing.
+  explicit CommandLine(CLI::App& app);
+  // Throws std::runtime_error with a one-line message for the user.
+  void Run();
 
-EvalCommandLine::EvalCommandLine(CLI::App& app) {
+ private:
+  void AddCommon(CLI::App& command);
+  std::vector<EvaluationInput> ReadInputs() const;
+  void RunAbsolute() const;
+  void RunRelative() const;
+
+  std::function<void()> chosen_;
+  std::vector<std::string> files_;  // estimate, reference, estimate, reference, ...
+  double max_gap_s_ = 1e-6 * kMaxGroundTruthGapUs;
+  std::string json_path_;
+  std::string plot_prefix_;
+  std::vector<double> distances_m_ = {1, 2, 5, 10, 20, 50};
+  std::vector<double> durations_s_ = {1, 10};
+};
+
+CommandLine::CommandLine(CLI::App& app) {
   app.require_subcommand(1);
   CLI::App* ate = app.add_subcommand("ate", "absolute error of one trajectory");
   CLI::App* joint = app.add_subcommand(
@@ -83,7 +105,7 @@ EvalCommandLine::EvalCommandLine(CLI::App& app) {
   rpe->callback([this] { chosen_ = [this] { RunRelative(); }; });
 }
 
-void EvalCommandLine::AddCommon(CLI::App& command) {
+void CommandLine::AddCommon(CLI::App& command) {
   command
       .add_option("--max-gap", max_gap_s_,
                   "seconds between reference poses across which it is still interpolated")
@@ -93,9 +115,9 @@ void EvalCommandLine::AddCommon(CLI::App& command) {
                      "write the metrics to this file; -: to stdout, in place of the table");
 }
 
-void EvalCommandLine::Run() { chosen_(); }
+void CommandLine::Run() { chosen_(); }
 
-std::vector<EvaluationInput> EvalCommandLine::ReadInputs() const {
+std::vector<EvaluationInput> CommandLine::ReadInputs() const {
   if (files_.size() % 2 != 0) {
     throw std::runtime_error("each ESTIMATE needs its REFERENCE behind it");
   }
@@ -113,7 +135,7 @@ std::vector<EvaluationInput> EvalCommandLine::ReadInputs() const {
   return inputs;
 }
 
-void EvalCommandLine::RunAbsolute() const {
+void CommandLine::RunAbsolute() const {
   const std::vector<EvaluationInput> inputs = ReadInputs();
   const AbsoluteEvaluation evaluation = EvaluateAbsolute(inputs, max_gap_s_);
   Write(ToText(evaluation), ToJson(evaluation), json_path_);
@@ -125,11 +147,25 @@ void EvalCommandLine::RunAbsolute() const {
   }
 }
 
-void EvalCommandLine::RunRelative() const {
+void CommandLine::RunRelative() const {
   const std::vector<EvaluationInput> inputs = ReadInputs();
   const RelativeEvaluation evaluation =
       EvaluateRelative(inputs.front(), distances_m_, durations_s_, max_gap_s_);
   Write(ToText(evaluation), ToJson(evaluation), json_path_);
 }
 
-}  // namespace pangea
+}  // namespace
+
+int RunCommandLine(int argc, char** argv) {
+  CLI::App app("Errors of trajectories against ground truth");
+  CommandLine commands(app);
+  CLI11_PARSE(app, argc, argv);
+  try {
+    commands.Run();
+  } catch (const std::exception& error) {
+    return Failed("pangea-eval", error);
+  }
+  return OutputIsWritten("pangea-eval") ? 0 : 1;
+}
+
+}  // namespace pangea::eval

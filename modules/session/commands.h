@@ -1,6 +1,6 @@
 #pragma once
 
-// The command line of pangea-session.
+// The commands of pangea-session.
 
 #include <CLI/CLI.hpp>
 

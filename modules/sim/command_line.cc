@@ -9,6 +9,7 @@
 
 #include "files/progress.h"
 #include "options/command_line.h"
+#include "sim/recording.h"
 #include "sim/render/frame_cache.h"
 
 namespace pangea::sim {
@@ -31,7 +32,29 @@ CameraModel CameraOf(const std::string& name) {
   return name == "phone" ? PhoneCamera() : WideCamera();
 }
 
-}  // namespace
+class CommandLine {
+ public:
+  // Adds its options to `app`; both must exist until Run has returned.
+  explicit CommandLine(CLI::App& app);
+  // Throws std::runtime_error with a one-line message for the user.
+  void Run();
+
+ private:
+  void AddPath(CLI::App& app);
+  void AddScene(CLI::App& app);
+  void AddSensors(CLI::App& app);
+  void Apply();
+  RecordingSummary Render() const;
+
+  RecordingOptions options_;
+  std::string generate_ = "walk";
+  std::string scene_ = "hall";
+  std::string camera_ = "euroc";
+  double shrink_ = 1;
+  double knot_spacing_s_ = 0;
+  double exposure_ms_ = 3;
+  bool no_cache_ = false;
+};
 
 CommandLine::CommandLine(CLI::App& app) {
   app.add_option("--out", options_.out, "folder that will hold mav0/")->required();
@@ -187,6 +210,20 @@ void CommandLine::Run() {
     fmt::print(", {} position steps spread", summary.steps_spread);
   }
   fmt::print("\n");
+}
+
+}  // namespace
+
+int RunCommandLine(int argc, char** argv) {
+  CLI::App app("Renders a visual-inertial recording in EuRoC's format, with exact ground truth");
+  CommandLine command(app);
+  CLI11_PARSE(app, argc, argv);
+  try {
+    command.Run();
+  } catch (const std::exception& error) {
+    return Failed("pangea-sim", error);
+  }
+  return 0;
 }
 
 }  // namespace pangea::sim

@@ -1,4 +1,4 @@
-// pangea-keyframe-player: log of keyframes ─► KEYFRAME_k
+#include "replay/command_line.h"
 
 #include <fmt/format.h>
 
@@ -8,11 +8,13 @@
 #include "options/command_line.h"
 #include "replay/keyframe_player.h"
 
-int main(int argc, char** argv) {
+namespace pangea::replay {
+
+int RunCommandLine(int argc, char** argv) {
   CLI::App app("Plays stored keyframes onto an agent's bus, in place of an odometry",
                "pangea-keyframe-player");
-  pangea::KeyframePlayerOptions options;
-  std::string bus_url = pangea::kDefaultBusUrl;
+  KeyframePlayerOptions options;
+  std::string bus_url = kDefaultBusUrl;
   std::string log, rate = "1";
   app.add_option("--agent", options.agent_id, "agent id, as in the keyframes")
       ->required()
@@ -26,22 +28,23 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1e-3, 1e6) | CLI::IsMember({"max"}))
       ->capture_default_str();
   app.add_option("--duration", options.duration_s, "seconds to play (default: to the end)")
-      ->check(pangea::Positive());
+      ->check(Positive());
   app.footer(
       "Exit code: 0; 1 when it failed; 3 when something of the log is lost (it is damaged, or "
       "ends in the middle of an event): then what could be read was played.");
   CLI11_PARSE(app, argc, argv);
-  pangea::LogReadings readings;
+  LogReadings readings;
   try {
     options.rate = rate == "max" ? 0 : std::stod(rate);
-    pangea::InstallSignalHandlers();
-    pangea::LcmBus bus(bus_url);
-    auto keyframes = pangea::ReadKeyframeLogOf(log, options.agent_id, &readings);
-    const int exit_code = pangea::TellLosses("pangea-keyframe-player", readings, 0);
-    pangea::PlayKeyframes(bus, options, std::move(keyframes));
+    InstallSignalHandlers();
+    LcmBus bus(bus_url);
+    auto keyframes = ReadKeyframeLogOf(log, options.agent_id, &readings);
+    const int exit_code = TellLosses("pangea-keyframe-player", readings, 0);
+    PlayKeyframes(bus, options, std::move(keyframes));
     return exit_code;
   } catch (const std::exception& error) {
-    return pangea::TellLosses("pangea-keyframe-player", readings,
-                              pangea::Failed("pangea-keyframe-player", error));
+    return TellLosses("pangea-keyframe-player", readings, Failed("pangea-keyframe-player", error));
   }
 }
+
+}  // namespace pangea::replay

@@ -1,7 +1,8 @@
-#include "site/commands.h"
+#include "site/command_line.h"
 
 #include <fmt/format.h>
 
+#include <CLI/CLI.hpp>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -9,6 +10,8 @@
 #include <string>
 
 #include "bus/process.h"
+#include "log_file/log_reading.h"
+#include "options/command_line.h"
 #include "options/yaml_options.h"
 #include "site/backup.h"
 #include "site/compact.h"
@@ -24,7 +27,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Arguments {
-  bool* lost = nullptr;  // as in commands.h
+  bool* lost = nullptr;  // set after damage that the command itself told
   std::string site, other, out, name, bus, link;
   bool with_keys = false;
   bool now = false;
@@ -239,14 +242,30 @@ void AddChanging(CLI::App& app, const Shared& arguments) {
   remove->callback([arguments] { RunDelete(*arguments); });
 }
 
-}  // namespace
-
+// The given command runs during parsing. `readings`: receives the damage of the logs that were
+// read.
 void AddCommands(CLI::App& app, LogReadings* readings, bool* lost) {
   const auto arguments = std::make_shared<Arguments>();
   arguments->lost = lost;
   AddReading(app, arguments, readings);
   AddMaking(app, arguments);
   AddChanging(app, arguments);
+}
+
+}  // namespace
+
+int RunCommandLine(int argc, char** argv) {
+  CLI::App app("Makes, lists, backs up, merges, compacts, exports and deletes sites: named maps",
+               "pangea-site");
+  app.require_subcommand(1);
+  app.footer(
+      "Exit code: 0; 1 when something could not be done; 3 when something of a journal is lost (it "
+      "is damaged): then all is of what could be read; above 100 for a wrong command line.");
+  LogReadings readings;
+  bool lost = false;
+  AddCommands(app, &readings, &lost);
+  const int exit_code = TellLosses("pangea-site", readings, RunSubcommand(app, argc, argv));
+  return exit_code == 0 && lost ? kExitLost : exit_code;
 }
 
 }  // namespace pangea::site

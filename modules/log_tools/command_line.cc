@@ -1,4 +1,4 @@
-// pangea-log: the contents of a captured log, parts of it, and exports to other formats.
+#include "log_tools/command_line.h"
 
 #include <fmt/format.h>
 
@@ -21,7 +21,7 @@
 #include "options/command_line.h"
 #include "report/session_record.h"
 
-namespace pangea {
+namespace pangea::log_tools {
 namespace {
 
 struct Arguments {
@@ -258,8 +258,6 @@ void AddCost(CLI::App& app, Arguments* arguments) {
   });
 }
 
-}  // namespace
-
 void AddCommands(CLI::App& app, Arguments* arguments) {
   for (const auto add : {AddInfo, AddList, AddAnchors, AddDiff, AddCut, AddCat, AddExport,
                          AddImport, AddExplain, AddCost}) {
@@ -267,18 +265,19 @@ void AddCommands(CLI::App& app, Arguments* arguments) {
   }
 }
 
-}  // namespace pangea
+}  // namespace
 
-int main(int argc, char** argv) {
+int RunCommandLine(int argc, char** argv) {
   CLI::App app("What is in a captured LCM log, parts of it, and other formats", "pangea-log");
   app.require_subcommand(1);
   app.footer(
       "Exit code: 0; 1 when something could not be done; 2 when logs differ; 3 when something of a "
       "log is lost (it is damaged, or ends in the middle of an event): then all is of what could "
       "be read; above 100 for a wrong command line.");
-  pangea::Arguments arguments;
-  pangea::AddCommands(app, &arguments);
-  const int failed = pangea::RunSubcommand(app, argc, argv);
-  return pangea::TellLosses("pangea-log", arguments.readings,
-                            failed != 0 ? failed : arguments.exit_code);
+  Arguments arguments;
+  AddCommands(app, &arguments);
+  const int failed = RunSubcommand(app, argc, argv);
+  return TellLosses("pangea-log", arguments.readings, failed != 0 ? failed : arguments.exit_code);
 }
+
+}  // namespace pangea::log_tools

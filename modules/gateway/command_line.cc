@@ -1,9 +1,10 @@
-#include "gateway/commands.h"
+#include "gateway/command_line.h"
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <CLI/CLI.hpp>
 #include <chrono>
 #include <iostream>
 #include <map>
@@ -14,9 +15,11 @@
 #include "gateway/admission.h"
 #include "gateway/identity.h"
 #include "gateway/qr_code.h"
+#include "gateway/run_gateway.h"
 #include "link/agent_key.h"
+#include "options/command_line.h"
 
-namespace pangea {
+namespace pangea::gateway {
 namespace {
 
 struct Arguments {
@@ -134,9 +137,8 @@ void AddSubcommands(CLI::App& app) {
   list->callback([arguments] { List(*arguments); });
 }
 
-}  // namespace
-
-void AddGatewayCommands(CLI::App& app, GatewayArguments* arguments) {
+// The options of the gateway itself, and its subcommands, which run when the app parses them.
+void AddArguments(CLI::App& app, GatewayArguments* arguments) {
   app.add_option("--site", arguments->site, "the site's folder");
   app.add_option("--bus", arguments->bus, "LCM URL of the server bus (default: the site's)");
   app.add_option("--link", arguments->link, "LCM URL of the link bus (default: the site's)");
@@ -160,4 +162,29 @@ void AddGatewayCommands(CLI::App& app, GatewayArguments* arguments) {
   AddSubcommands(app);
 }
 
-}  // namespace pangea
+}  // namespace
+
+int RunCommandLine(int argc, char** argv) {
+  CLI::App app(
+      "Serves the phone's page, lets agents join by a code, and carries their link packets",
+      "pangea-gateway");
+  GatewayArguments arguments;
+  AddArguments(app, &arguments);
+  try {
+    app.parse(argc, argv);
+    if (!app.get_subcommands().empty()) {
+      return 0;  // the subcommand has run while parsing
+    }
+    if (arguments.site.empty()) {
+      throw std::runtime_error("give --site FOLDER");
+    }
+    RunGateway(arguments);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error);
+  } catch (const std::exception& error) {
+    return Failed("pangea-gateway", error);
+  }
+  return 0;
+}
+
+}  // namespace pangea::gateway
