@@ -94,7 +94,7 @@ TEST_F(LinkWorld, UplinkRestartedAfterTheLastKeyframeFindsTheTail) {
   ExpectDelivered(20);
 }
 
-TEST_F(LinkWorld, WithoutAHandlerEverythingWaits) {
+TEST_F(LinkWorld, KeyframesWaitInTheUplinkWhileNoHandlerRuns) {
   KillHandler();
   PublishKeyframes(100);
   Run(10);
@@ -118,7 +118,7 @@ TEST_F(LinkWorld, WhatIsNotOnDiskIsNotAcknowledged) {
   ExpectDelivered(5);
 }
 
-TEST_F(LinkWorld, WhatNobodyHasIsGivenUpAndSaid) {
+TEST_F(LinkWorld, KeyframesThatNobodyHasAreGivenUpAndNamedInHave) {
   std::vector<seq_gap_t> gaps;
   server_bus.Subscribe("HAVE", [&](const std::string&, Bytes data) {
     have_t have{};
@@ -135,7 +135,7 @@ TEST_F(LinkWorld, WhatNobodyHasIsGivenUpAndSaid) {
   EXPECT_EQ(gaps[0].to_seq, 4);
 }
 
-TEST_F(LinkWorld, EveryGapOfAThinnedJournalIsSaid) {
+TEST_F(LinkWorld, EveryGapOfAThinnedJournalIsNamedInHave) {
   KillHandler();
   // One of the maps has more than a message takes.
   const std::vector<int> num_gaps{600, 600, 1100, 50};

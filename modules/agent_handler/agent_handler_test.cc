@@ -115,7 +115,7 @@ TEST_F(AgentHandlerTest, RefusesWhatCannotBeOfItsMap) {
   EXPECT_EQ(send(ToMessage(TestKeyframe({kMap, 1}))), "");
 }
 
-TEST_F(AgentHandlerTest, TellsTheHighestCorrectionUntilItIsConfirmed) {
+TEST_F(AgentHandlerTest, SendsTheNewestCorrectionUntilItIsConfirmed) {
   Correction correction;
   correction.map = kMap;
   for (const int revision : {3, 7, 5}) {
@@ -222,7 +222,7 @@ TEST(OutstandingResults, AsksSeldomAndMoreSeldomWhileNothingComes) {
 }
 
 // A verification result that was journalled before its match is not outstanding any more.
-TEST(JournalIndex, ResultBeforeItsMatch) {
+TEST(JournalIndex, AResultThatCameBeforeItsMatchIsNotMissing) {
   JournalIndex index;
   index.AddKeyframe({kMap, 0}, {});
   Constraint result;
@@ -264,7 +264,7 @@ TEST(ResendQueue, AnswersInOrderAndDropsWhatIsCovered) {
 }
 
 // A request for named verification results is answered with those that exist, and nothing else.
-TEST(ResendQueue, AnswersForTheResultsThatAreThere) {
+TEST(ResendQueue, AnswersWithTheRequestedResultsThatAreJournalled) {
   JournalIndex index;
   index.AddKeyframe({kMap, 0}, {});
   VerificationRequest request{"posegraph", {kMap, {}}};
@@ -291,7 +291,7 @@ TEST(ResendQueue, AnswersForTheResultsThatAreThere) {
   EXPECT_EQ(queue.waiting(), 0u) << "what is still to be verified needs no answer";
 }
 
-TEST(ResendQueue, RefusesTheAbsurdAndStaysBounded) {
+TEST(ResendQueue, RefusesInvalidRequestsAndStaysBounded) {
   JournalIndex index;
   index.AddKeyframe({kMap, 0}, {});
   ResendQueue queue;

@@ -101,7 +101,7 @@ TEST_F(AnchorLink, AKilledUplinkWithASpoolLosesNoEdit) {
 }
 
 // Before a keyframe has said where that was: then as it was known live.
-TEST_F(AnchorLink, AKilledUplinkWithASpoolKeepsATap) {
+TEST_F(AnchorLink, AKilledUplinkWithASpoolLosesNoTap) {
   KillUplink();
   spools_edits = true;
   StartUplink();
@@ -141,7 +141,7 @@ TEST_F(AnchorLink, AKilledServerLosesNoEdit) {
   EXPECT_EQ(uplink_counters.at("anchor_edits_waiting"), 0);
 }
 
-TEST_F(AnchorLink, StatesArriveAndTheNewestWins) {
+TEST_F(AnchorLink, TheNewestStateOfEachAnchorArrivesOverABadLink) {
   MakeLinkBad();
   std::mt19937_64 rng(6);
   std::map<AnchorId, AnchorState> newest;

@@ -50,7 +50,7 @@ TEST_F(AnchorLink, ATapCarriesThePoseOfItsImage) {
   EXPECT_NEAR(journalled.begin()->second.T_odom_body->t.x(), 0.25, 1e-9);
 }
 
-TEST_F(AnchorLink, WhatWasOvertakenDoesNotWin) {
+TEST_F(AnchorLink, AnOvertakenStateDoesNotReplaceANewerOne) {
   link_bus.held = 0.3;
   Run(2);
   for (int64_t revision = 1; revision < 100; ++revision) {
@@ -62,7 +62,7 @@ TEST_F(AnchorLink, WhatWasOvertakenDoesNotWin) {
   }
 }
 
-TEST_F(AnchorLink, WhatTheKeyDoesNotAllowIsRefusedAndNotSentForEver) {
+TEST_F(AnchorLink, EditsThatTheKeyForbidsAreRefusedAndNotSentForEver) {
   Request(TestEdit({2, 5}, 1, 1));  // another agent's anchor
   Request(TestEdit({1, 5}, 1, 1));
   Run(2);
@@ -161,7 +161,7 @@ TEST_F(AnchorLink, ToolsOnTheServersBusEditAll) {
   ExpectOnceEach(1);
 }
 
-TEST_F(AnchorLink, MoreThanAnAgentTakesAreLeftOutAndSaid) {
+TEST_F(AnchorLink, AnchorsBeyondAnAgentsLimitAreLeftOutAndCounted) {
   for (int i = 0; i < 300; ++i) {
     PublishAnchor(TestAnchor({2, i}, 1, kMap));
   }
@@ -174,7 +174,7 @@ TEST_F(AnchorLink, MoreThanAnAgentTakesAreLeftOutAndSaid) {
 
 // An agent that never confirms, as one of an earlier version, costs no more than the rate; one that
 // is away costs nothing.
-TEST_F(AnchorLink, ADeafAgentCostsABoundedRate) {
+TEST_F(AnchorLink, StatesThatAreNeverConfirmedAreRepeatedAtABoundedRate) {
   KillUplink();
   UplinkSession session(1, ReadKeyFileOf(KeyFile(1), 1));
   int64_t bytes = 0;
@@ -207,7 +207,7 @@ TEST_F(AnchorLink, ADeafAgentCostsABoundedRate) {
 }
 
 // Noise and damaged messages on every channel of anchors, and in packets that open.
-TEST_F(AnchorLink, NothingOfAnchorsCrashesAProcess) {
+TEST_F(AnchorLink, ArbitraryAnchorMessagesCrashNoProcess) {
   const std::vector<std::vector<uint8_t>> payloads = {
       EncodeMessage(ToMessage(TestEdit({1, 5}, 1, 1))),
       EncodeMessage(ToMessage(TestAnchor({1, 5}, 1, kMap))),

@@ -49,7 +49,7 @@ TEST_F(AnchorTableTest, SendsUntilConfirmed) {
   EXPECT_TRUE(Sent().empty()) << "nothing new";
 }
 
-TEST_F(AnchorTableTest, TheNewestWins) {
+TEST_F(AnchorTableTest, OnlyTheNewestStateIsSentAndConfirmed) {
   table.Set(kA, false, Message(kA, 1));
   EXPECT_EQ(Sent().at(0).number, 1);
   table.Set(kA, false, Message(kA, 2));
@@ -74,7 +74,7 @@ TEST_F(AnchorTableTest, AnotherSessionGetsAllAgain) {
   EXPECT_EQ(table.unconfirmed(), 0u);
 }
 
-TEST_F(AnchorTableTest, IsBounded) {
+TEST_F(AnchorTableTest, HoldsABoundedNumberOfAnchors) {
   for (int i = 0; i < static_cast<int>(AnchorTable::kMaxAnchors); ++i) {
     ASSERT_TRUE(table.Set({2, i}, false, Message({2, i}, 1)));
   }

@@ -265,7 +265,7 @@ TEST_F(LinkWorld, AnAgentIsShutOutThoughAnotherKeyIsBad) {
   EXPECT_THAT(summary, testing::HasSubstr("the folder of keys is empty: nobody can join"));
 }
 
-TEST_F(LinkWorld, AnotherVersionIsSaid) {
+TEST_F(LinkWorld, AnAgentOfAnotherVersionIsNamedInTheStatus) {
   MakeKeyFile(KeyFile(2), 2);
   std::string summary;
   server_bus.Subscribe("STATUS_agent_handler", [&](const std::string&, Bytes data) {
@@ -287,7 +287,7 @@ TEST_F(LinkWorld, AnotherVersionIsSaid) {
                          OurSoftware());
 }
 
-TEST_F(LinkWorld, AnUplinkWithAnotherKeyGetsNothingAndBothSay) {
+TEST_F(LinkWorld, AnUplinkWithAnotherKeyGetsNothingAndBothStatusesSaySo) {
   std::string uplink_says, handler_says;
   const auto hear = [](Bus& bus, const char* channel, std::string* summary) {
     bus.Subscribe(channel, [summary](const std::string&, Bytes data) {
@@ -319,7 +319,7 @@ TEST_F(LinkWorld, AnUplinkWithAnotherKeyGetsNothingAndBothSay) {
 }
 
 // Noise, and every message with damaged bytes, on every channel that is listened to.
-TEST_F(LinkWorld, NothingOnABusCrashesAProcess) {
+TEST_F(LinkWorld, ArbitraryMessagesCrashNoProcess) {
   std::vector<std::vector<uint8_t>> link_messages;
   link_bus.Subscribe("LINK_.*", [&](const std::string&, Bytes data) {
     if (link_messages.size() < 50) {

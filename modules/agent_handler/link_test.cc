@@ -224,7 +224,7 @@ TEST(Link, RepeatsStayModestUnderLoss) {
 
 // A round trip of 4 s holds back no agent that makes 40 kB/s of keyframes, and nothing that is only
 // late is sent twice.
-TEST(Link, ALongWayCarriesWhatAnAgentMakes) {
+TEST(Link, ALongDelayLeavesTheRateOfAnAgent) {
   World world({0, 0, 2'000'000, 0}, 4);
   world.Hello({kMap});
   world.SendHello();
@@ -253,7 +253,7 @@ TEST(Link, TwoMapsAreDeliveredEachInOrder) {
   EXPECT_EQ(got_later, later);
 }
 
-TEST(Link, AnotherPacketSizeWorksToo) {
+TEST(Link, AnyPacketSizeDeliversEverything) {
   for (const int payload : {256, 4096, 30'000}) {
     SenderOptions options;
     options.payload_bytes = payload;
@@ -321,7 +321,7 @@ TEST(Sender, HasFewKeyframesUnderWay) {
   EXPECT_EQ(sender.Poll(2).size(), static_cast<size_t>(kMaxPartialKeyframes));
 }
 
-TEST(Sender, WhatNobodyAnswersIsSentEverMoreRarely) {
+TEST(Sender, UnansweredKeyframesAreSentEverMoreRarely) {
   Sender sender({});
   ASSERT_TRUE(sender.Add({kMap, 0}, std::vector<uint8_t>(100)));
   sender.SetNext(kMap, 0);
@@ -334,7 +334,7 @@ TEST(Sender, WhatNobodyAnswersIsSentEverMoreRarely) {
 }
 
 // A packet that others have overtaken is not waited for, nor is it sent without end.
-TEST(Sender, WhatIsOvertakenIsRetransmittedAtOnceButNotForEver) {
+TEST(Sender, AnOvertakenPieceIsRetransmittedAtOnceButNotForEver) {
   SenderOptions options;
   options.payload_bytes = kMinPayloadBytes;
   Sender sender(options);
@@ -365,7 +365,7 @@ TEST(Sender, WhatIsOvertakenIsRetransmittedAtOnceButNotForEver) {
   EXPECT_LE(sent, 10u);
 }
 
-TEST(Sender, WhatIsStoredTakesNoMemory) {
+TEST(Sender, KeyframesStoredInTheSpoolTakeNoMemory) {
   constexpr int kKeyframes = 2000;
   constexpr size_t kBytes = 24'000;
   const auto in_use = [] { return mallinfo2().uordblks; };

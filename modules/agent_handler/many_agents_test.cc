@@ -79,7 +79,7 @@ class ManyAgents : public LinkWorld {
   std::vector<std::unique_ptr<UplinkProcess>> uplinks;
 };
 
-TEST_F(ManyAgents, AsManyAsItTakesAreServed) {
+TEST_F(ManyAgents, AThousandAgentsAreServed) {
   std::set<std::string> came;
   status_t status;
   server_bus.Subscribe("KEYFRAME_.*",
@@ -99,7 +99,7 @@ TEST_F(ManyAgents, AsManyAsItTakesAreServed) {
   EXPECT_EQ(CounterOf(status, fmt::format("keyframes_{}", kMost)), 1);
 }
 
-TEST_F(ManyAgents, OneMoreIsRefusedByFolderAndLimit) {
+TEST_F(ManyAgents, AFolderWithMoreKeysIsRefused) {
   MakeKeyFile(KeyFile(kMost + 1), kMost + 1);
   EXPECT_THAT([this] { StartHandler(); },
               testing::ThrowsMessage<std::runtime_error>(

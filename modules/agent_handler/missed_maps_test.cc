@@ -53,14 +53,14 @@ class MissedMaps : public testing::Test {
   int64_t now = 1'000'000;
 };
 
-TEST_F(MissedMaps, AnUplinkThatStartsLateFindsTheFirstOnes) {
+TEST_F(MissedMaps, AnUplinkThatStartsLateFetchesTheFirstMaps) {
   Publish(1, 0, 39);
   Publish(2, 0, 0);
   Publish(3, 0, 39);
   EXPECT_EQ(LiveUplink(20, [&] { Publish(4, 0, 0); }), published);
 }
 
-TEST_F(MissedMaps, AnUplinkThatWasKilledFindsTheEndOfOneAndAllOfTheNext) {
+TEST_F(MissedMaps, AKilledUplinkFetchesTheEndOfOneMapAndAllOfTheNext) {
   EXPECT_EQ(LiveUplink(1, [&] { Publish(1, 0, 22); }), 23u);
   Publish(1, 23, 31);
   Publish(2, 0, 31);

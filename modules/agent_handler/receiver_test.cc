@@ -25,7 +25,7 @@ void AddAll(Receiver* receiver, const KeyframeId& id) {
   }
 }
 
-TEST(Receiver, RefusesWhatNobodyAnnounced) {
+TEST(Receiver, RefusesPiecesThatNoHelloAnnounced) {
   Receiver receiver({}, CheckContent);
   EXPECT_NE(AddPiece(&receiver, {kMap, 0}, 0), "");
   receiver.OnHello({"", {{kMap, 0, 0}}});
@@ -35,7 +35,7 @@ TEST(Receiver, RefusesWhatNobodyAnnounced) {
   EXPECT_NE(AddPiece(&receiver, {kMap, 0}, 0), "");
 }
 
-TEST(Receiver, AnotherUplinkMayCutOtherwise) {
+TEST(Receiver, ANewUplinkMayCutAKeyframeIntoOtherPieces) {
   Receiver receiver({}, CheckContent);
   receiver.OnHello({"", {{kMap, 0, 0}}});
   const auto content = Content({kMap, 0});
@@ -50,7 +50,7 @@ TEST(Receiver, AnotherUplinkMayCutOtherwise) {
   EXPECT_EQ(ready[0].bytes, content);
 }
 
-TEST(Receiver, WhatDoesNotFitTogetherComesAgain) {
+TEST(Receiver, AKeyframeOfInconsistentPiecesIsDroppedAndComesAgain) {
   Receiver receiver({}, CheckContent);
   receiver.OnHello({"", {{kMap, 0, 0}}});
   const std::vector<uint8_t> data(100);
@@ -68,7 +68,7 @@ TEST(Receiver, WhatDoesNotFitTogetherComesAgain) {
   EXPECT_EQ(receiver.TakeReady().size(), 1u);
 }
 
-TEST(Receiver, AKeyframeWithoutEndIsBounded) {
+TEST(Receiver, AKeyframeWithoutALastPieceIsRefusedAtTheSizeLimit) {
   Receiver receiver({}, CheckContent);
   receiver.OnHello({"", {{kMap, 0, 0}}});
   const std::vector<uint8_t> data(kMaxPayloadBytes);
@@ -79,7 +79,7 @@ TEST(Receiver, AKeyframeWithoutEndIsBounded) {
 }
 
 // Only the low byte of a seq travels.
-TEST(Receiver, SeqsGoOnBeyondAByte) {
+TEST(Receiver, SeqsBeyond255AreInOrder) {
   Receiver receiver({}, CheckContent);
   receiver.Resume(kMap, 254);
   receiver.OnHello({"", {{kMap, 0, 0}}});
@@ -126,7 +126,7 @@ TEST(Receiver, FillsGapsBeforeItGoesOn) {
   EXPECT_EQ(receiver.pending(), 1u) << "of those it has, none stays";
 }
 
-TEST(Receiver, AGapThatIsGivenUpCostsWhatIsMissingAlone) {
+TEST(Receiver, GivingUpAGapLosesOnlyTheMissingKeyframes) {
   Receiver receiver({}, CheckContent);
   receiver.Resume(kMap, 400, {{kMap, 3, 4}, {kMap, 300, 300}});
   receiver.OnHello({"", {{kMap, 20, 0}}});
@@ -178,7 +178,7 @@ TEST(Receiver, OlderMapsMakeRoomForTheNewestInAFullCache) {
   EXPECT_LE(receiver.cached_bytes(), 100'000);
 }
 
-TEST(Receiver, WhatIsNotYetOnDiskMakesNoRoom) {
+TEST(Receiver, KeyframesNotYetOnDiskMakeNoRoomInAFullCache) {
   Receiver receiver({60'000}, CheckContent);
   receiver.OnHello({"", {{kMap, 0, 0}, {kLaterMap, 0, 0}}});
   for (int seq = 0; seq < 10; ++seq) {
@@ -228,7 +228,7 @@ TEST(Receiver, AnAckNamesABoundedNumberOfMaps) {
   EXPECT_EQ(ack.journalled_seq.size(), static_cast<size_t>(kMaxAckMaps));
 }
 
-TEST(Receiver, WhatTheUplinkCannotDeliverIsGivenUpAndCounted) {
+TEST(Receiver, KeyframesThatTheUplinkCannotDeliverAreGivenUpAndCounted) {
   Receiver receiver({}, CheckContent);
   receiver.OnHello({"", {{kMap, 5, 0}}});
   EXPECT_EQ(receiver.given_up(), 5);

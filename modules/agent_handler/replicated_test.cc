@@ -28,7 +28,7 @@ class Replicated : public LinkWorld {
   bool stores_ = true;
 };
 
-TEST_F(Replicated, WhatTheDiskHasIsAcknowledgedOnceOthersHaveIt) {
+TEST_F(Replicated, KeyframesAreAcknowledgedOnceTheyAreReplicated) {
   Run(2);
   stores_ = false;
   PublishKeyframes(8);
@@ -40,7 +40,7 @@ TEST_F(Replicated, WhatTheDiskHasIsAcknowledgedOnceOthersHaveIt) {
   EXPECT_EQ(acknowledged, 7);
 }
 
-TEST_F(Replicated, NorDoesAHandlerThatStartsOnItsJournalAcknowledgeIt) {
+TEST_F(Replicated, ARestartedHandlerAcknowledgesOnlyWhatIsReplicated) {
   Run(2);
   PublishKeyframes(5);
   Run(5);

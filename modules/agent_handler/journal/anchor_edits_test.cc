@@ -81,7 +81,7 @@ class AnchorEditsTest : public testing::Test {
   int64_t now = 1'000'000;
 };
 
-TEST_F(AnchorEditsTest, OnceEachNumberedOnTheDiskBeforeTheyArePublished) {
+TEST_F(AnchorEditsTest, EachIsNumberedAndJournalledOnceBeforeItIsPublished) {
   EXPECT_EQ(archive->Append(TestEdit({1, 5}, 1, 1)), Taken::kQueued);
   EXPECT_EQ(archive->Append(TestEdit({1, 5}, 1, 1)), Taken::kQueued);
   EXPECT_EQ(archive->Append(TestEdit({1, 5}, 1, 2)), Taken::kQueued) << "another editor";
@@ -96,7 +96,7 @@ TEST_F(AnchorEditsTest, OnceEachNumberedOnTheDiskBeforeTheyArePublished) {
   EXPECT_EQ(archive->Append(TestEdit({1, 5}, 1, 1)), Taken::kJournalled);
 }
 
-TEST_F(AnchorEditsTest, GoOnAfterARestart) {
+TEST_F(AnchorEditsTest, NumbersGoOnAfterARestart) {
   for (int i = 0; i < 20; ++i) {
     archive->Append(TestEdit({1, i}, 1, 1));
     archive->Append({{1, 1000}, i}, EncodeTestKeyframe({{1, 1000}, i}));
@@ -133,7 +133,7 @@ TEST_F(AnchorEditsTest, AnchorsWithoutANameInTheJournalOfAnEarlierVersionStay) {
   EXPECT_EQ(again[0].name, "");
 }
 
-TEST_F(AnchorEditsTest, TheNewestIsRepeated) {
+TEST_F(AnchorEditsTest, TheNewestIsPublishedWithEachHave) {
   archive->PublishHave();
   bus.Drain();
   EXPECT_TRUE(published.empty());
@@ -152,7 +152,7 @@ TEST_F(AnchorEditsTest, TheNewestIsRepeated) {
 }
 
 // The numbers that damage has cost do not come again, and nobody has to ask for them for ever.
-TEST_F(AnchorEditsTest, DamageCostsWhatItHit) {
+TEST_F(AnchorEditsTest, DamageLosesOnlyTheEditItHit) {
   for (int i = 0; i < 6; ++i) {
     archive->Append(TestEdit({1, i}, 1, 1));
     Sync();

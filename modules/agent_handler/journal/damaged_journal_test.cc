@@ -72,7 +72,7 @@ class DamagedJournal : public LinkWorld {
   status_t status{};
 };
 
-TEST_F(DamagedJournal, KeyframesThatTheOdometryHasAreBack) {
+TEST_F(DamagedJournal, LostKeyframesAreFetchedFromTheOdometry) {
   PublishKeyframes(40);
   Run(10);
   KillHandler();
@@ -93,7 +93,7 @@ TEST_F(DamagedJournal, KeyframesThatTheOdometryHasAreBack) {
   EXPECT_THAT(Journalled("KEYFRAME_1"), testing::UnorderedElementsAreArray(Encoded(all)));
 }
 
-TEST_F(DamagedJournal, ANewUplinkFetchesThemToo) {
+TEST_F(DamagedJournal, ANewUplinkFetchesLostKeyframes) {
   PublishKeyframes(40);
   Run(10);
   KillHandler();
@@ -107,7 +107,7 @@ TEST_F(DamagedJournal, ANewUplinkFetchesThemToo) {
 }
 
 // The odometry has the newest 200; what is older is lost, and said so once it cannot come any more.
-TEST_F(DamagedJournal, WhatNobodyHasIsGivenUpAndTheRestIsBack) {
+TEST_F(DamagedJournal, LostKeyframesThatTheOdometryNoLongerHasAreGivenUp) {
   PublishKeyframes(40);
   Run(10);
   KillHandler();

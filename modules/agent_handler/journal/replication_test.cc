@@ -37,7 +37,7 @@ TEST(Replication, WhatOthersHaveIsKeptAndNothingBeyond) {
   EXPECT_FALSE(replication.Awaits(kMap.agent_id));
 }
 
-TEST(Replication, NobodyIsAnsweredBeforeAllOfTheStartIsThereNorInSilence) {
+TEST(Replication, WorksOnceTheStartIsReplicatedUntilTheBridgeIsSilent) {
   Replication replication(true, 1000);
   EXPECT_FALSE(replication.Works(0));
   replication.OnReplicated(999, 0);
