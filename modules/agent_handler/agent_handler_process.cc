@@ -166,37 +166,49 @@ void AgentHandlerProcess::OnLinkUp(const std::string& channel, Bytes data) {
   if (!opened.welcome.empty()) {
     SendDown(agent_id, &agent, opened.welcome);
   }
-  if (!opened.packet) {
-    return;
+  if (opened.packet) {
+    ++agent.packets;
+    agent.heard_us = now_us_;
+    agent.new_uplink = agent.new_uplink || opened.new_uplink;
+    if (HasJoined(agent_id, &agent)) {
+      TakePacket(agent_id, &agent, opened);
+    }
   }
-  ++agent.packets;
-  agent.heard_us = now_us_;
-  agent.new_uplink = agent.new_uplink || opened.new_uplink;
-  if (!agent.handler && !archive_.MayJoin(agent_id)) {
-    return;  // else it would be told of keyframes that are not kept, or send some twice
+}
+
+// Lets the agent join if it has not yet.
+bool AgentHandlerProcess::HasJoined(int32_t agent_id, Agent* agent) {
+  if (agent->handler) {
+    return true;
   }
-  if (!agent.handler) {
-    agent.handler.emplace(MakeHandler(agent_id));
-    Log(node_.name(), fmt::format("agent {} has joined", agent_id));
+  if (!archive_.MayJoin(agent_id)) {
+    return false;  // else it would be told of keyframes that are not kept, or send some twice
   }
+  agent->handler.emplace(MakeHandler(agent_id));
+  Log(node_.name(), fmt::format("agent {} has joined", agent_id));
+  return true;
+}
+
+void AgentHandlerProcess::TakePacket(int32_t agent_id, Agent* agent,
+                                     const HandlerSession::Opened& opened) {
   if (opened.two_uplinks) {
     node_.Refuse(fmt::format(
         "two uplinks run as agent {}: end one, or give it an id and a key of its own", agent_id));
   }
-  if (std::exchange(agent.new_uplink, false)) {
-    agent.handler->OnNewUplink();
+  if (std::exchange(agent->new_uplink, false)) {
+    agent->handler->OnNewUplink();
     anchors_.OnNewSession(agent_id);
   }
   const std::string reason = AnchorRelay::IsOfAnchors(opened.packet->kind)
                                  ? anchors_.OnPacket(agent_id, *opened.packet)
-                                 : agent.handler->OnPacket(*opened.packet);
+                                 : agent->handler->OnPacket(*opened.packet);
   if (!reason.empty()) {
     node_.Refuse(reason);
   }
-  if (const auto pose = agent.handler->TakePose()) {
+  if (const auto pose = agent->handler->TakePose()) {
     node_.Publish(channels::Pose(agent_id), *pose);
   }
-  JournalReady(&agent);
+  JournalReady(agent);
 }
 
 void AgentHandlerProcess::JournalReady(Agent* agent) {

@@ -52,6 +52,8 @@ class AgentHandlerProcess : public PolledProcess {
     int64_t keyframes = 0;
   };
   void OnLinkUp(const std::string& channel, Bytes data);
+  bool HasJoined(int32_t agent_id, Agent* agent);
+  void TakePacket(int32_t agent_id, Agent* agent, const HandlerSession::Opened& opened);
   // Whether the agent's uplink sent something lately.
   bool IsThere(const Agent& agent) const;
   // Returns the packet's bytes on the wire.

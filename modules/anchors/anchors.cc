@@ -188,6 +188,26 @@ std::vector<AnchorId> Anchors::DeletedOf(const MapId& map) const {
   return deleted;
 }
 
+// The nearest of its group first.
+std::vector<AnchorId> Anchors::Near(const MapId& map, const Rigid3& T_odom_map,
+                                    const Eigen::Vector3d& p_odom_agent) const {
+  std::vector<std::pair<double, AnchorId>> near;
+  for (const auto& [id, position] : Positions()) {
+    const double away_m = (T_odom_map * position.T_map_anchor.t - p_odom_agent).norm();
+    if (away_m <= options_.near_m && !registry_.entries().at(id).deleted &&
+        SameGroup(map, placements_.at(id).map)) {
+      near.emplace_back(away_m, id);
+    }
+  }
+  std::ranges::sort(near);
+  near.resize(std::min<size_t>(near.size(), options_.max_near));
+  std::vector<AnchorId> ids;
+  for (const auto& [away_m, id] : near) {
+    ids.push_back(id);
+  }
+  return ids;
+}
+
 std::vector<AnchorState> Anchors::ForAgent(const MapId& map, const std::set<AnchorId>& told) const {
   const auto track = tracks_.find(map);
   if (track == tracks_.end()) {
@@ -199,19 +219,8 @@ std::vector<AnchorState> Anchors::ForAgent(const MapId& map, const std::set<Anch
       correction == corrections_.end() ? Matrix6d(Matrix6d::Zero()) : correction->second.covariance;
   const Matrix6d frame_covariance = InverseCovariance(T_odom_map.Inverse(), correction_covariance);
   const Eigen::Vector3d p_odom_agent = track->second.keyframes().rbegin()->second.T_odom_body.t;
-  std::vector<std::pair<double, AnchorId>> near;
-  for (const auto& [id, position] : Positions()) {
-    const double away_m = (T_odom_map * position.T_map_anchor.t - p_odom_agent).norm();
-    if (away_m <= options_.near_m && !registry_.entries().at(id).deleted &&
-        SameGroup(map, placements_.at(id).map)) {
-      near.emplace_back(away_m, id);
-    }
-  }
-  std::ranges::sort(near);
-  near.resize(std::min<size_t>(near.size(), options_.max_near));
-
   std::vector<AnchorState> states;
-  for (const auto& [away_m, id] : near) {
+  for (const AnchorId& id : Near(map, T_odom_map, p_odom_agent)) {
     const InGroup& position = Positions().at(id);
     AnchorState& state = states.emplace_back(Describe(id, map));
     state.T_odom_anchor = T_odom_map * position.T_map_anchor;

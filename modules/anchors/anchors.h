@@ -115,6 +115,8 @@ class Anchors {
   // The anchor's state without its pose.
   AnchorState Describe(const AnchorId& id, const MapId& map) const;
   std::vector<AnchorId> DeletedOf(const MapId& map) const;
+  std::vector<AnchorId> Near(const MapId& map, const Rigid3& T_odom_map,
+                             const Eigen::Vector3d& p_odom_agent) const;
 
   const AnchorsOptions options_;
   const std::shared_ptr<RecordStore> records_;

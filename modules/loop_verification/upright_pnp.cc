@@ -78,6 +78,54 @@ std::vector<Rigid3> Hypotheses(const PointObservation& a, const PointObservation
   return result;
 }
 
+// The hypothesis of random pairs of observations that scores best; nothing if none scores.
+std::optional<Rigid3> BestHypothesis(const Problem& problem, const std::vector<double>& tilt_var,
+                                     uint64_t seed) {
+  const std::vector<PointObservation>& observations = problem.observations;
+  std::vector<std::vector<int>> samples(2);  // by direction
+  for (size_t i = 0; i < observations.size(); ++i) {
+    samples[observations[i].direction == Direction::kForward ? 0 : 1].push_back(
+        static_cast<int>(i));
+  }
+  std::mt19937_64 random(seed);
+  double best_score = 0;
+  Rigid3 best;
+  for (int iteration = 0; iteration < kPnpSamples; ++iteration) {
+    const std::vector<int>& sample =
+        samples[random() % observations.size() < samples[0].size() ? 0 : 1];
+    if (sample.size() < 2) {
+      continue;
+    }
+    const size_t i = random() % sample.size();
+    const size_t j = (i + 1 + random() % (sample.size() - 1)) % sample.size();
+    for (const Rigid3& T_m_c : Hypotheses(observations[sample[i]], observations[sample[j]])) {
+      const double score = problem.Score(T_m_c, tilt_var, best_score);
+      if (score > best_score) {
+        best_score = score;
+        best = T_m_c;
+      }
+    }
+  }
+  return best_score > 0 ? std::optional(best) : std::nullopt;
+}
+
+// Refines all six degrees of freedom on the inliers, twice: the first inlier set still allows for
+// the tilt.
+UprightPnpResult Refined(const Problem& problem, const Rigid3& T_m_c,
+                         const std::vector<double>& tilt_var, double tilt_sigma) {
+  const std::vector<double> no_tilt(problem.observations.size(), 0.0);
+  UprightPnpResult result{{T_m_c, Matrix6d::Identity()}, problem.Inliers(T_m_c, tilt_var)};
+  for (int round = 0; round < 2; ++round) {
+    std::vector<PointObservation> inliers;
+    for (const int i : result.inliers) {
+      inliers.push_back(problem.observations[i]);
+    }
+    result.pose = RefinePose(inliers, result.pose.T_m_c, tilt_sigma);
+    result.inliers = problem.Inliers(result.pose.T_m_c, no_tilt);
+  }
+  return result;
+}
+
 }  // namespace
 
 std::vector<Rigid3> SolveUprightTwoPoint(const Eigen::Vector3d& p1_w, const Eigen::Vector3d& p2_w,
@@ -125,52 +173,14 @@ std::optional<UprightPnpResult> SolveUprightPnp(const std::vector<PointObservati
                                                 const Eigen::Vector3d& origin_m, double tilt_sigma,
                                                 uint64_t seed) {
   Problem problem{observations, ray_pairs, origin_c, origin_m};
-  std::vector<std::vector<int>> samples(2);  // by direction
-  std::vector<double> tilt_var(observations.size());
-  const std::vector<double> no_tilt(observations.size(), 0.0);
-  for (size_t i = 0; i < observations.size(); ++i) {
-    samples[observations[i].direction == Direction::kForward ? 0 : 1].push_back(
-        static_cast<int>(i));
-    const double tilt_sigmas = tilt_sigma * SigmaPerRadian(observations[i]);
-    tilt_var[i] = tilt_sigmas * tilt_sigmas;
-    problem.R_cam_w.push_back(observations[i].T_cam_w.R());
+  std::vector<double> tilt_var;
+  for (const PointObservation& observation : observations) {
+    const double tilt_sigmas = tilt_sigma * SigmaPerRadian(observation);
+    tilt_var.push_back(tilt_sigmas * tilt_sigmas);
+    problem.R_cam_w.push_back(observation.T_cam_w.R());
   }
-
-  std::mt19937_64 random(seed);
-  double best_score = 0;
-  Rigid3 best;
-  for (int iteration = 0; iteration < kPnpSamples; ++iteration) {
-    const std::vector<int>& sample =
-        samples[random() % observations.size() < samples[0].size() ? 0 : 1];
-    if (sample.size() < 2) {
-      continue;
-    }
-    const size_t i = random() % sample.size();
-    const size_t j = (i + 1 + random() % (sample.size() - 1)) % sample.size();
-    for (const Rigid3& T_m_c : Hypotheses(observations[sample[i]], observations[sample[j]])) {
-      const double score = problem.Score(T_m_c, tilt_var, best_score);
-      if (score > best_score) {
-        best_score = score;
-        best = T_m_c;
-      }
-    }
-  }
-  if (best_score <= 0) {
-    return std::nullopt;
-  }
-
-  // Refine all six degrees of freedom on the inliers, twice: the first inlier set still allows for
-  // the tilt.
-  UprightPnpResult result{{best, Matrix6d::Identity()}, problem.Inliers(best, tilt_var)};
-  for (int round = 0; round < 2; ++round) {
-    std::vector<PointObservation> inliers;
-    for (const int i : result.inliers) {
-      inliers.push_back(observations[i]);
-    }
-    result.pose = RefinePose(inliers, result.pose.T_m_c, tilt_sigma);
-    result.inliers = problem.Inliers(result.pose.T_m_c, no_tilt);
-  }
-  return result;
+  const auto best = BestHypothesis(problem, tilt_var, seed);
+  return best ? std::optional(Refined(problem, *best, tilt_var, tilt_sigma)) : std::nullopt;
 }
 
 }  // namespace pangea

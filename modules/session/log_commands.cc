@@ -220,6 +220,50 @@ void AddResultOptions(CLI::App& command, LogArguments* arguments) {
       "what the session remembers)");
 }
 
+void AddServerOptions(CLI::App& replay, ReplayArguments* arguments) {
+  replay
+      .add_option("--options", arguments->options,
+                  "YAML file of options by process (fusion: {alignment: {min_inliers: 20}}), over "
+                  "those of the log")
+      ->check(CLI::ExistingFile);
+  replay
+      .add_option("--set", arguments->set,
+                  "process.key=value, e.g. fusion.alignment.min_inliers=20; over --options; may "
+                  "be given several times")
+      ->allow_extra_args(false);
+  replay
+      .add_option("--until", arguments->until_s,
+                  "Only the first so many seconds of the log (default: all of it)")
+      ->check(Positive());
+  replay
+      .add_option("--from-checkpoint", arguments->checkpoint_s,
+                  "The matches and verification results of the first so many seconds are taken "
+                  "from the log, not made again")
+      ->check(Positive());
+}
+
+// What is asked of the replay besides its report.
+void AddQuestions(CLI::App& replay, ReplayArguments* arguments) {
+  replay
+      .add_option("--only", arguments->only,
+                  "These processes alone (a,b,...), fed with what the others said in the log, and "
+                  "where their messages differ from those in the log; no report")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(CLI::IsMember(std::vector<std::string>(std::begin(kReplayed), std::end(kReplayed))));
+  replay
+      .add_option("--diff", arguments->diff,
+                  "Another log: where the replay parts from it (exit code 2 when it does)")
+      ->check(CLI::ExistingFile);
+  replay.add_option(
+      "--explain", arguments->explain,
+      "A constraint's id: why it was accepted or refused, as text, and as a picture in "
+      "the folder");
+  for (const char* of_the_report : {"--recording", "--expect", "--explain"}) {
+    replay.get_option("--only")->excludes(replay.get_option(of_the_report));
+  }
+}
+
 }  // namespace
 
 void AddReplayCommand(CLI::App& app, CommandResult* result) {
@@ -234,43 +278,8 @@ void AddReplayCommand(CLI::App& app, CommandResult* result) {
       ->required()
       ->check(CLI::ExistingFile);
   AddResultOptions(*replay, arguments.get());
-  replay
-      ->add_option("--options", arguments->options,
-                   "YAML file of options by process (fusion: {alignment: {min_inliers: 20}}), over "
-                   "those of the log")
-      ->check(CLI::ExistingFile);
-  replay
-      ->add_option("--set", arguments->set,
-                   "process.key=value, e.g. fusion.alignment.min_inliers=20; over --options; may "
-                   "be given several times")
-      ->allow_extra_args(false);
-  replay
-      ->add_option("--until", arguments->until_s,
-                   "Only the first so many seconds of the log (default: all of it)")
-      ->check(Positive());
-  replay
-      ->add_option("--from-checkpoint", arguments->checkpoint_s,
-                   "The matches and verification results of the first so many seconds are taken "
-                   "from the log, not made again")
-      ->check(Positive());
-  replay
-      ->add_option("--only", arguments->only,
-                   "These processes alone (a,b,...), fed with what the others said in the log, and "
-                   "where their messages differ from those in the log; no report")
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->check(CLI::IsMember(std::vector<std::string>(std::begin(kReplayed), std::end(kReplayed))));
-  replay
-      ->add_option("--diff", arguments->diff,
-                   "Another log: where the replay parts from it (exit code 2 when it does)")
-      ->check(CLI::ExistingFile);
-  replay->add_option(
-      "--explain", arguments->explain,
-      "A constraint's id: why it was accepted or refused, as text, and as a picture in "
-      "the folder");
-  for (const char* of_the_report : {"--recording", "--expect", "--explain"}) {
-    replay->get_option("--only")->excludes(replay->get_option(of_the_report));
-  }
+  AddServerOptions(*replay, arguments.get());
+  AddQuestions(*replay, arguments.get());
   replay->callback(
       [arguments, result] { result->exit_code = RunReplay(*arguments, &result->readings); });
 }

@@ -72,6 +72,28 @@ void TakeOwner(const fs::path& from, const fs::path& to) {
   }
 }
 
+// Writes the new journal, and checks that it says what it should. On failure nothing remains of it.
+void WriteAndCompare(const fs::path& journal, const JournalContents& contents,
+                     ThinnedJournal* thinned, const fs::path& made,
+                     const std::function<void(CompactStep)>& on_step, CompactSummary* summary) try {
+  const JournalContents meant = WriteWhatCounts(journal, contents, thinned, made, on_step);
+  summary->events_after = meant.events;
+  TakeOwner(journal, made);
+  on_step(CompactStep::kWritten);
+  const JournalContents written = ReadContents(made);
+  if (!written.reading.whole() || !written.SaysTheSame(thinned != nullptr ? meant : contents)) {
+    throw std::runtime_error(
+        fmt::format("{}: does not say what {} says, and is thrown away; is the disk all right?",
+                    made.string(), journal.string()));
+  }
+  summary->bytes_after = static_cast<int64_t>(fs::file_size(made));
+  SyncToDisk(made);
+  on_step(CompactStep::kCompared);
+} catch (...) {
+  fs::remove(made);
+  throw;
+}
+
 }  // namespace
 
 CompactSummary Compact(const Site& site, const std::optional<ThinJournal>& thin,
@@ -100,25 +122,7 @@ CompactSummary Compact(const Site& site, const std::optional<ThinJournal>& thin,
     summary.keyframes_gone = thinned->keyframes_gone();
     summary.constraints_derived = thinned->constraints_derived();
   }
-  try {
-    const JournalContents meant =
-        WriteWhatCounts(journal, contents, thinned ? &*thinned : nullptr, made, on_step);
-    summary.events_after = meant.events;
-    TakeOwner(journal, made);
-    on_step(CompactStep::kWritten);
-    const JournalContents written = ReadContents(made);
-    if (!written.reading.whole() || !written.SaysTheSame(thin ? meant : contents)) {
-      throw std::runtime_error(
-          fmt::format("{}: does not say what {} says, and is thrown away; is the disk all right?",
-                      made.string(), journal.string()));
-    }
-    summary.bytes_after = static_cast<int64_t>(fs::file_size(made));
-    SyncToDisk(made);
-    on_step(CompactStep::kCompared);
-  } catch (...) {
-    fs::remove(made);
-    throw;
-  }
+  WriteAndCompare(journal, contents, thinned ? &*thinned : nullptr, made, on_step, &summary);
   fs::remove_all(site.checkpoints());  // they belong to the old journal
   fs::rename(made, journal);
   on_step(CompactStep::kSwapped);

@@ -56,32 +56,7 @@ void Thinning::JoinEdges(ThinnedMaps* thinned) const {
 
 Thinning::Solution Thinning::Solve(const ThinnedMaps& without) const {
   PoseGraph graph(options_.posegraph);
-  for (const MapId& map : maps_) {
-    graph.AddMap(map);  // in order of age, even if none of its keyframes stays
-  }
-  for (const MapId& map : maps_) {
-    for (const Keyframe& keyframe : stored_.at(map).keyframes) {
-      if (without.gone.contains(keyframe.id)) {
-        continue;
-      }
-      if (const auto edge = without.edges.find(keyframe.id); edge != without.edges.end()) {
-        Keyframe joined = keyframe;
-        joined.edge = edge->second.edge;
-        graph.AddKeyframe(joined);
-      } else {
-        graph.AddKeyframe(keyframe);
-      }
-    }
-  }
-  for (const auto& [id, constraint] : constraints_) {
-    if (!without.gone.contains(constraint.from) && !without.gone.contains(constraint.to) &&
-        (constraint.kind != PlaceKind::kDerived || without.gone.empty())) {
-      graph.AddConstraint(constraint);
-    }
-  }
-  for (const Constraint& constraint : without.derived) {
-    graph.AddConstraint(constraint);
-  }
+  FillGraph(without, &graph);
   graph.Finish();
   Solution solution;
   solution.odometry_scale = graph.counters().odometry_scale;
@@ -100,6 +75,35 @@ Thinning::Solution Thinning::Solve(const ThinnedMaps& without) const {
     }
   }
   return solution;
+}
+
+void Thinning::FillGraph(const ThinnedMaps& without, PoseGraph* graph) const {
+  for (const MapId& map : maps_) {
+    graph->AddMap(map);  // in order of age, even if none of its keyframes stays
+  }
+  for (const MapId& map : maps_) {
+    for (const Keyframe& keyframe : stored_.at(map).keyframes) {
+      if (without.gone.contains(keyframe.id)) {
+        continue;
+      }
+      if (const auto edge = without.edges.find(keyframe.id); edge != without.edges.end()) {
+        Keyframe joined = keyframe;
+        joined.edge = edge->second.edge;
+        graph->AddKeyframe(joined);
+      } else {
+        graph->AddKeyframe(keyframe);
+      }
+    }
+  }
+  for (const auto& [id, constraint] : constraints_) {
+    if (!without.gone.contains(constraint.from) && !without.gone.contains(constraint.to) &&
+        (constraint.kind != PlaceKind::kDerived || without.gone.empty())) {
+      graph->AddConstraint(constraint);
+    }
+  }
+  for (const Constraint& constraint : without.derived) {
+    graph->AddConstraint(constraint);
+  }
 }
 
 NodeRemoval Thinning::Removed(const Solution& solution, const std::set<KeyframeId>& gone) const {

@@ -23,6 +23,28 @@ double MedianDistance(const WindowPair& windows, const std::vector<PointMatch>& 
   return Median(std::move(distances));
 }
 
+// Sigmas of the error that all corners of a view share (JointBaOptions::systematic_px).
+Vector6d SystematicSigmas(const WindowPair& windows, const std::vector<PointMatch>& matches,
+                          const std::vector<bool>& inlier, double systematic_px) {
+  const double rotation =
+      systematic_px * windows.c.keyframe(windows.c.newest()).camera.PixelAngle();
+  const double step = rotation * MedianDistance(windows, matches, inlier);
+  Vector6d sigmas;
+  sigmas << Eigen::Vector3d::Constant(step), Eigen::Vector3d::Constant(rotation);
+  return sigmas;
+}
+
+// Rotates a covariance from the window's axes to Km's; the origin is Km's already.
+Matrix6d InAxesOfKm(const Matrix6d& covariance, const Eigen::Matrix3d& R_Km_w, double scale,
+                    const Vector6d& systematic_sigmas) {
+  Matrix6d rotation = Matrix6d::Zero();
+  rotation.topLeftCorner<3, 3>() = R_Km_w;
+  rotation.bottomRightCorner<3, 3>() = R_Km_w;
+  Matrix6d rotated = scale * rotation * covariance * rotation.transpose();
+  rotated.diagonal() += systematic_sigmas.cwiseAbs2();
+  return rotated;
+}
+
 }  // namespace
 
 std::optional<JointBaResult> SolveJointBa(const WindowPair& windows,
@@ -40,9 +62,7 @@ std::optional<JointBaResult> SolveJointBa(const WindowPair& windows,
     }
     problem.Classify(&result.inlier, &chi2_sum);
   }
-  for (const bool inlier : result.inlier) {
-    result.num_inlier_observations += inlier ? 1 : 0;
-  }
+  result.num_inlier_observations = static_cast<int>(std::ranges::count(result.inlier, true));
   const auto marginals = problem.MarginalsOfNewestC(matches, result.inlier);
   if (!marginals || result.num_inlier_observations == 0) {
     return std::nullopt;
@@ -55,20 +75,11 @@ std::optional<JointBaResult> SolveJointBa(const WindowPair& windows,
   const Rigid3 T_w_Kc = problem.NewestPose(kSideC);
   result.T_m_c = T_w_Kc * windows.c.T_w_body.back().Inverse();
   result.T_Km_Kc = T_w_Km.Inverse() * T_w_Kc;
-  // Rotate the covariance from the window's axes to Km's; the origin is Km's already.
-  Matrix6d rotation = Matrix6d::Zero();
-  rotation.topLeftCorner<3, 3>() = T_w_Km.R().transpose();
-  rotation.bottomRightCorner<3, 3>() = T_w_Km.R().transpose();
-  const double rotation_floor =
-      options.systematic_px * windows.c.keyframe(windows.c.newest()).camera.PixelAngle();
-  const double step_floor = rotation_floor * MedianDistance(windows, matches, result.inlier);
-  Vector6d floor;
-  floor << Eigen::Vector3d::Constant(step_floor), Eigen::Vector3d::Constant(rotation_floor);
-  const auto in_Km = [&](const Matrix6d& covariance) -> Matrix6d {
+  const Vector6d systematic =
+      SystematicSigmas(windows, matches, result.inlier, options.systematic_px);
+  const auto in_Km = [&](const Matrix6d& covariance) {
     // Scale up if the residuals are larger than expected.
-    Matrix6d rotated = std::max(1.0, variance) * rotation * covariance * rotation.transpose();
-    rotated.diagonal() += floor.cwiseAbs2();
-    return rotated;
+    return InAxesOfKm(covariance, T_w_Km.R().transpose(), std::max(1.0, variance), systematic);
   };
   result.covariance = in_Km(marginals->all);
   result.covariance_without_one = in_Km(marginals->without_one);
