@@ -10,33 +10,19 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "cluster/nats_connection.h"
+
 namespace pangea {
 namespace {
 
-constexpr int64_t kReconnectWait_ms = 500;
-constexpr int64_t kPing_ms = 2000;  // to notice that a host is gone
+constexpr int64_t kRetry_ms = 500;
 constexpr int64_t kNanosecondsPerMicrosecond = 1000;
 constexpr int64_t kMaxUnacknowledged = 100'000;  // NATS' own default would stop a large cluster
 constexpr char kUtimeHeader[] = "Pangea-Utime";
 constexpr char kExpectedOfStream[] = "Nats-Expected-Last-Sequence";
 constexpr char kExpectedOfSubject[] = "Nats-Expected-Last-Subject-Sequence";
-// More than the largest event of a journal; nats-server's own default is four times as much.
-constexpr int64_t kMinPayload = 256 * 1024;
 // How long a NATS cluster that was just started may take to elect its leader.
 constexpr std::chrono::seconds kLongestChoice{20};
-
-struct Deleter {
-  void operator()(natsConnection* connection) const { natsConnection_Destroy(connection); }
-  void operator()(natsOptions* options) const { natsOptions_Destroy(options); }
-  void operator()(natsSubscription* subscription) const { natsSubscription_Destroy(subscription); }
-  void operator()(natsMsg* message) const { natsMsg_Destroy(message); }
-  void operator()(jsCtx* context) const { jsCtx_Destroy(context); }
-  void operator()(jsConsumerInfo* info) const { jsConsumerInfo_Destroy(info); }
-  void operator()(jsStreamInfo* info) const { jsStreamInfo_Destroy(info); }
-  void operator()(jsPubAck* answer) const { jsPubAck_Destroy(answer); }
-};
-template <typename T>
-using Owned = std::unique_ptr<T, Deleter>;
 
 std::vector<uint8_t> DataOf(const natsMsg* message) {
   const char* const data = natsMsg_GetData(message);
@@ -52,37 +38,6 @@ bool IsStatus(natsMsg* message) {
 int64_t UtimeOf(natsMsg* message) {
   const char* utime = nullptr;
   return natsMsgHeader_Get(message, kUtimeHeader, &utime) == NATS_OK ? std::atoll(utime) : 0;
-}
-
-std::string WhyNotConnected(natsStatus status, const NatsAccess& access) {
-  const std::string& url = access.url;
-  // If the server requires TLS, libnats tries it by itself, without a trusted authority.
-  if (!access.tls() && (status == NATS_SSL_ERROR || status == NATS_SECURE_CONNECTION_REQUIRED)) {
-    return fmt::format("NATS at {} takes TLS only: give --nats tls://HOST:4222 and --ca FILE", url);
-  }
-  switch (status) {
-    case NATS_CONNECTION_AUTH_FAILED:
-      return access.credentials.empty()
-                 ? fmt::format("NATS at {} wants a user and a password: give --credentials FILE",
-                               url)
-                 : fmt::format(
-                       "NATS at {} refuses the user of {}: another password, or none of its "
-                       "users",
-                       url, access.credentials.string());
-    case NATS_SECURE_CONNECTION_WANTED:
-      return fmt::format("NATS at {} has no TLS, and gets no password: see pangea-nats-config",
-                         url);
-    case NATS_SSL_ERROR:
-      return fmt::format(
-          "NATS at {}: its certificate is not of the authority in {}, or for "
-          "another host: {}",
-          url, access.ca.string(), nats_GetLastError(nullptr));
-    default:
-      return fmt::format(
-          "cannot reach NATS at {}: {}; give --nats with its URL, or start it: "
-          "nats-server -a 127.0.0.1 -js -sd FOLDER",
-          url, natsStatus_GetText(status));
-  }
 }
 
 // Whether the error may be temporary: a leader is being elected, or needed nodes are not there yet.
@@ -113,10 +68,9 @@ int64_t StoredUtime(const std::string& ack_subject) {
 
 struct NatsClient::Impl {
   std::string url;
-  Owned<natsOptions> options;
-  Owned<natsConnection> connection;
-  Owned<jsCtx> context;
-  Owned<natsSubscription> heard;
+  NatsOwned<natsConnection> connection;
+  NatsOwned<jsCtx> context;
+  NatsOwned<natsSubscription> heard;
 
   void Check(natsStatus status, jsErrCode error, const std::string& what) const {
     if (status == NATS_NO_RESPONDERS || error == JSNotEnabledErr) {
@@ -134,44 +88,11 @@ struct NatsClient::Impl {
     jsErrCode error{};
     natsStatus status = make(&error);
     while (MayChange(status, error) && std::chrono::steady_clock::now() < end) {
-      nats_Sleep(kReconnectWait_ms);
+      nats_Sleep(kRetry_ms);
       error = {};
       status = make(&error);
     }
     Check(status, error, what);
-  }
-
-  // Sets the options of the connection.
-  void SetOptions(const NatsAccess& access, const std::string& name) {
-    natsOptions* made = nullptr;
-    natsOptions_Create(&made);
-    options.reset(made);
-    natsOptions_SetName(made, name.c_str());
-    natsOptions_SetTimeout(made, kTimeout_ms);
-    natsOptions_SetMaxReconnect(made, -1);
-    natsOptions_SetReconnectWait(made, kReconnectWait_ms);
-    natsOptions_SetPingInterval(made, kPing_ms);
-    const std::vector<std::string> urls = access.Urls();
-    std::vector<const char*> servers;
-    for (const std::string& one : urls) {
-      servers.push_back(one.c_str());
-    }
-    if (natsOptions_SetServers(made, servers.data(), static_cast<int>(servers.size())) != NATS_OK) {
-      throw std::runtime_error(fmt::format("--nats {}: is no URL as tls://HOST:4222", access.url));
-    }
-    if (access.tls()) {
-      natsOptions_SetSecure(made, true);
-      if (natsOptions_LoadCATrustedCertificates(made, access.ca.c_str()) != NATS_OK) {
-        throw std::runtime_error(
-            fmt::format("--ca {}: cannot be read as certificates", access.ca.string()));
-      }
-    }
-    if (!access.credentials.empty()) {
-      const NatsCredentials credentials = ReadCredentials(access.credentials);
-      natsOptions_SetUserInfo(made, credentials.user.c_str(), credentials.password.c_str());
-      // A prefix for each user, so that other users cannot read the answers.
-      natsOptions_SetCustomInboxPrefix(made, ("_INBOX." + credentials.user).c_str());
-    }
   }
 
   std::optional<Message> Get(const std::string& stream, jsDirectGetMsgOptions* which) const {
@@ -180,7 +101,7 @@ struct NatsClient::Impl {
     }
     natsMsg* got = nullptr;
     const natsStatus status = js_DirectGetMsg(&got, context.get(), stream.c_str(), nullptr, which);
-    const Owned<natsMsg> message(got);
+    const NatsOwned<natsMsg> message(got);
     if (status != NATS_OK) {
       return std::nullopt;
     }
@@ -194,26 +115,13 @@ struct NatsClient::Impl {
 
 NatsClient::NatsClient(const NatsAccess& access, const std::string& name)
     : impl_(std::make_unique<Impl>()) {
-  access.Check();
   impl_->url = access.url;
-  impl_->SetOptions(access, name);
-  natsConnection* connection = nullptr;
-  natsStatus status = natsConnection_Connect(&connection, impl_->options.get());
-  impl_->connection.reset(connection);
-  if (status != NATS_OK) {
-    throw std::runtime_error(WhyNotConnected(status, access));
-  }
-  if (const int64_t payload = natsConnection_GetMaxPayload(connection); payload < kMinPayload) {
-    throw std::runtime_error(
-        fmt::format("NATS at {} takes messages of {} bytes, and a site needs {}: raise max_payload "
-                    "in its configuration",
-                    access.url, payload, kMinPayload));
-  }
+  impl_->connection = ConnectToNats(access, name, kTimeout_ms);
   jsOptions wait{};
   jsOptions_Init(&wait);
   wait.Wait = kTimeout_ms;
   jsCtx* context = nullptr;
-  status = natsConnection_JetStream(&context, connection, &wait);
+  const natsStatus status = natsConnection_JetStream(&context, impl_->connection.get(), &wait);
   impl_->context.reset(context);
   impl_->Check(status, jsErrCode(0), "JetStream");
 }
@@ -229,7 +137,7 @@ void NatsClient::MakeStream(const std::string& stream, const std::string& subjec
   const char* const names[] = {subjects.c_str()};
   jsStreamInfo* got = nullptr;
   js_GetStreamInfo(&got, impl_->context.get(), stream.c_str(), nullptr, nullptr);
-  const Owned<jsStreamInfo> info(got);
+  const NatsOwned<jsStreamInfo> info(got);
   jsStreamConfig config{};
   jsStreamConfig_Init(&config);
   config.Name = stream.c_str();
@@ -272,7 +180,7 @@ NatsClient::StoreAnswer NatsClient::Store(const std::string& subject, Bytes data
   natsMsg* made = nullptr;
   natsMsg_Create(&made, subject.c_str(), nullptr, reinterpret_cast<const char*>(data.data()),
                  static_cast<int>(data.size()));
-  const Owned<natsMsg> message(made);
+  const NatsOwned<natsMsg> message(made);
   if (utime != 0) {
     natsMsgHeader_Set(made, kUtimeHeader, std::to_string(utime).c_str());
   }
@@ -286,7 +194,7 @@ NatsClient::StoreAnswer NatsClient::Store(const std::string& subject, Bytes data
   jsErrCode error{};
   jsPubAck* got = nullptr;
   const natsStatus status = js_PublishMsg(&got, impl_->context.get(), made, &options, &error);
-  const Owned<jsPubAck> answer(got);
+  const NatsOwned<jsPubAck> answer(got);
   if (status == NATS_OK) {
     return {Stored::kNew, answer->Sequence};
   }
@@ -303,7 +211,7 @@ std::optional<uint64_t> NatsClient::LastSequence(const std::string& stream) {
   jsStreamInfo* got = nullptr;
   const natsStatus status =
       js_GetStreamInfo(&got, impl_->context.get(), stream.c_str(), nullptr, nullptr);
-  const Owned<jsStreamInfo> info(got);
+  const NatsOwned<jsStreamInfo> info(got);
   return status == NATS_OK ? std::optional(info->State.LastSeq) : std::nullopt;
 }
 
@@ -336,7 +244,7 @@ std::optional<std::vector<std::string>> NatsClient::Subjects(const std::string& 
   jsStreamInfo* got = nullptr;
   const natsStatus status =
       js_GetStreamInfo(&got, impl_->context.get(), stream.c_str(), &options, nullptr);
-  const Owned<jsStreamInfo> info(got);
+  const NatsOwned<jsStreamInfo> info(got);
   if (status != NATS_OK) {
     return std::nullopt;
   }
@@ -359,7 +267,7 @@ std::optional<NatsClient::Delivery> NatsClient::Fetch(const std::string& stream,
   const natsStatus status =
       natsConnection_RequestString(&got, impl_->connection.get(), subject.c_str(),
                                    R"({"batch": 1, "no_wait": true})", kTimeout_ms);
-  const Owned<natsMsg> message(got);
+  const NatsOwned<natsMsg> message(got);
   if (status != NATS_OK || IsStatus(got) || natsMsg_GetReply(got) == nullptr) {
     return std::nullopt;
   }
@@ -374,7 +282,7 @@ bool NatsClient::Acknowledge(const std::string& ack_subject) {
   natsMsg* got = nullptr;
   const natsStatus status = natsConnection_RequestString(&got, impl_->connection.get(),
                                                          ack_subject.c_str(), "+ACK", kTimeout_ms);
-  const Owned<natsMsg> message(got);
+  const NatsOwned<natsMsg> message(got);
   return status == NATS_OK;
 }
 
@@ -395,7 +303,7 @@ std::optional<NatsClient::QueueState> NatsClient::StateOf(const std::string& str
   jsConsumerInfo* got = nullptr;
   const natsStatus status = js_GetConsumerInfo(&got, impl_->context.get(), stream.c_str(),
                                                consumer.c_str(), nullptr, nullptr);
-  const Owned<jsConsumerInfo> info(got);
+  const NatsOwned<jsConsumerInfo> info(got);
   if (status != NATS_OK) {
     return std::nullopt;
   }
@@ -424,7 +332,7 @@ std::optional<std::vector<uint8_t>> NatsClient::NextHeard() {
   }
   natsMsg* got = nullptr;
   const natsStatus status = natsSubscription_NextMsg(&got, impl_->heard.get(), 1);
-  const Owned<natsMsg> message(got);
+  const NatsOwned<natsMsg> message(got);
   return status == NATS_OK ? std::optional(DataOf(got)) : std::nullopt;
 }
 

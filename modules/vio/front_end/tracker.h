@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "core/camera_model.h"
+#include "vio/front_end/corners.h"
 #include "vio/front_end/equaliser.h"
 #include "vio/front_end/reference_patch.h"
 #include "vio/front_end/tracks.h"
@@ -77,8 +78,7 @@ class Tracker {
   using Pyramid = std::vector<cv::Mat>;  // each level, followed by its derivatives
   // Coarsest pyramid level of a search with a good initial guess.
   static constexpr int kNearLevel = 1;
-  using Found = std::optional<Eigen::Vector2f>;     // position in the newest image
-  using RatedCorner = std::pair<float, cv::Point>;  // the first is its smaller eigenvalue
+  using Found = std::optional<Eigen::Vector2f>;  // position in the newest image
 
   void Prepare(const cv::Mat& image);
   std::vector<Bearing> Bearings() const;
@@ -97,8 +97,6 @@ class Tracker {
   // Examines only the cells whose turn it is; the strongest corner first.
   std::vector<RatedCorner> CornersOfEmptyCells() const;
   void AddFeatures();
-  cv::Mat1f CornerResponse(const cv::Rect& cell) const;
-  std::vector<RatedCorner> FindCorners(const cv::Rect& cell) const;
   bool Inside(const cv::Point2f& pixel) const;
   void FillFrame(int64_t utime);
 

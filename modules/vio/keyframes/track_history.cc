@@ -11,6 +11,10 @@
 namespace pangea::vio {
 namespace {
 
+// An image counts as tracked if at least this many tracks, and this share of the earlier ones,
+// continue in it. In the noise of a covered lens a tenth do.
+constexpr size_t kMinTracks = 4;
+constexpr double kMinTrackShare = 0.3;
 constexpr size_t kMinShared = 15;  // landmarks needed for a median shift
 
 // d(ray)/d(intrinsics): a change of the intrinsics acts like a change of the pixel by (pixel - c) e
@@ -125,6 +129,12 @@ size_t TrackHistory::Shared(int64_t a_utime, int64_t b_utime) const {
   size_t shared = 0;
   ForShared(Frame(a_utime), Frame(b_utime), [&](const FrameRay&, const FrameRay&) { ++shared; });
   return shared;
+}
+
+bool TrackHistory::Continues(int64_t from_utime, int64_t to_utime) const {
+  const size_t shared = Shared(from_utime, to_utime);
+  const auto all = static_cast<double>(Frame(from_utime).size());
+  return shared >= kMinTracks && static_cast<double>(shared) >= kMinTrackShare * all;
 }
 
 TrackHistory::Shift TrackHistory::ShiftBetween(int64_t from_utime, int64_t to_utime,

@@ -36,6 +36,8 @@ class TrackHistory {
   const SeenLandmarks& Frame(int64_t utime) const;
   bool Sees(int32_t landmark_id) const;                   // in any frame
   size_t Shared(int64_t a_utime, int64_t b_utime) const;  // number of landmarks in both
+  // Whether enough tracks of an earlier image continue in another for it to count as tracked.
+  bool Continues(int64_t from_utime, int64_t to_utime) const;
 
   // Median shift of the landmarks that two frames share, rotation taken out, on the plane z = 1;
   // and their number.

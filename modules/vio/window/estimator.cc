@@ -16,6 +16,7 @@
 #include "vio/window/image_stamps.h"
 #include "vio/window/landmark_check.h"
 #include "vio/window/landmark_store.h"
+#include "vio/window/plausibility.h"
 #include "vio/window/unmodelled_acceleration.h"
 #include "vio/window/window_problem.h"
 #include "vio/window/window_solver.h"
@@ -28,14 +29,6 @@ using Eigen::MatrixXd;
 
 constexpr double kMaxFrameGap_s = 1.0;
 constexpr int64_t kStartSpan_us = 4'000'000;  // span of samples that a start may need
-constexpr double kMaxBlind_s = 5;             // lost after this time without a trackable image
-// An image counts as tracked if at least this many tracks, and this share of the earlier ones,
-// continue in it. In the noise of a covered lens a tenth do.
-constexpr size_t kMinTracks = 4;
-constexpr double kMinTrackShare = 0.3;
-constexpr double kMaxSpeed = 50;     // m/s
-constexpr double kMaxGyroBias = 1;   // rad/s
-constexpr double kMaxAccelBias = 4;  // m/s^2
 
 // With a rough calibration, unmodelled errors change the measured accelerations slowly, like a
 // drifting bias. A start separates tilt from bias by a small rotation only, and would then be far
@@ -45,8 +38,7 @@ constexpr int64_t kSettling_us = 2'000'000;
 constexpr double kSettlingWalk = 10;
 
 constexpr int kMaxIterations = 4;
-// A start has no solution of an earlier image: with little information four iterations end half
-// way.
+// A start has no earlier solution: with little information four iterations end half way.
 constexpr int kStartIterations = 20;
 
 double Seconds(int64_t us) { return 1e-6 * static_cast<double>(us); }
@@ -88,12 +80,10 @@ struct Estimator::Impl {
   void Append(int64_t utime, const ImuState& imu, std::optional<ImuFactor> factor);
   void AddToWindow(const TrackedFrame& frame);
   void DropNonKeyframe();
-  bool TracksGoOn(int64_t from_utime, int64_t to_utime) const;
   std::vector<int32_t> Solve(int max_iterations);
   void MarginaliseLandmarks(int frame);
   void ShrinkWindow(std::vector<FinishedKeyframe>* finished);
   void PublishUpTo(int newest, std::vector<FinishedKeyframe>* finished);
-  std::optional<std::string> Implausible() const;
   // On the IMU's clock, with the time offset of the newest image.
   int64_t ImuTime(int64_t frame_utime) const {
     return frame_utime + std::llround(1e6 * problem.state.TimeOffsetAt(excess_interval_s));
@@ -205,18 +195,12 @@ void Estimator::Impl::AddToWindow(const TrackedFrame& frame) {
           : std::nullopt;
   const bool stationary =
       stationary_detector.AddFrame(frame, shift, imu_samples, Newest().imu.gyro_bias);
-  const bool is_tracked = TracksGoOn(Newest().utime, frame.utime);
+  const bool is_tracked = history.Continues(Newest().utime, frame.utime);
   DropNonKeyframe();
   const ImuFactor factor = MakeImuFactor(Newest(), ImuTime(frame.utime));
   Append(frame.utime, Predict(factor.span.measured, Newest().imu), factor);
   Newest().stationary = stationary;
   Newest().is_tracked = is_tracked;
-}
-
-bool Estimator::Impl::TracksGoOn(int64_t from_utime, int64_t to_utime) const {
-  const size_t go_on = history.Shared(from_utime, to_utime);
-  const auto all = static_cast<double>(history.Frame(from_utime).size());
-  return go_on >= kMinTracks && static_cast<double>(go_on) >= kMinTrackShare * all;
 }
 
 // Optimises the window; returns the outliers among the newest image's tracks.
@@ -307,25 +291,6 @@ void Estimator::Impl::MarginaliseLandmarks(int frame) {
   });
 }
 
-std::optional<std::string> Estimator::Impl::Implausible() const {
-  const WindowFrame& newest = problem.state.frames.back();
-  const ImuState& imu = newest.imu;
-  if (!IsFinite(newest)) {
-    return "the estimate is not finite";
-  }
-  if (imu.v_odom_body.norm() > kMaxSpeed) {
-    return "the estimated speed is implausible";
-  }
-  if (imu.gyro_bias.norm() > kMaxGyroBias || imu.accel_bias.norm() > kMaxAccelBias) {
-    return "the estimated biases are implausible";
-  }
-  const double blind_s = Seconds(newest.utime - last_tracked);
-  if (blind_s > kMaxBlind_s) {
-    return fmt::format("nothing trackable for {:.1f} s", blind_s);
-  }
-  return std::nullopt;
-}
-
 std::optional<std::string> Estimator::Impl::TryStart(const TrackedFrame& frame,
                                                      std::span<const ImuSample> imu) {
   imu_samples.Forget(ImuTime(frame.utime) - kStartSpan_us);
@@ -387,7 +352,7 @@ FrameResult Estimator::Impl::AddFrame(const TrackedFrame& frame, std::span<const
     return result;
   }
   if (!wrong) {
-    wrong = Implausible();
+    wrong = Implausible(Newest(), last_tracked);
   }
   if (wrong) {
     lost = true;
@@ -430,19 +395,6 @@ CameraModel Estimator::camera() const {
   return camera;
 }
 
-WindowPoses Estimator::Poses() const {
-  const WindowState& state = impl_->problem.state;
-  WindowPoses poses;
-  std::vector<int> rows;
-  for (int i = 0; i <= state.Newest(); ++i) {
-    poses.utimes.push_back(state.frames[i].utime);
-    poses.T_odom_body.push_back(state.PoseAhead(i, state.Ahead(i, 0)));
-    for (int row = 0; row < kPoseSize; ++row) {
-      rows.push_back(state.FirstRow(i) + row);
-    }
-  }
-  poses.covariance = WindowCovariance(impl_->problem, rows)(rows, rows);
-  return poses;
-}
+WindowPoses Estimator::Poses() const { return PosesOf(impl_->problem); }
 
 }  // namespace pangea::vio

@@ -5,6 +5,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
+#include "core/imu/preintegration.h"
 #include "vio/window/testing/test_nees.h"
 #include "vio/window/testing/test_ride.h"
 #include "vio/window/window_state.h"
@@ -167,6 +168,78 @@ TEST(EstimatorConsistency, AStartWithARoughCalibrationIsBelievedNoMore) {
     tilt.Add(e.segment<2>(kTheta), first.covariance.block<2, 2>(kTheta, kTheta));
   }
   tilt.ExpectHonest("a rough start's tilt");
+}
+
+TEST(Estimator, KeyframesAreCompleteConsistentAndHonest) {
+  std::vector<double> edges, edge_positions, edge_rotations, tilts, depths;  // the rides' means
+  Mean preintegrated;
+  for (const Ride& ride : TenRides()) {
+    Mean edge, edge_position, edge_rotation, tilt, depth;
+    const uint64_t seed = ride.world.options().seed;
+    ASSERT_FALSE(ride.tracked.empty()) << "seed " << seed << ": " << ride.last.reason;
+
+    // Every announced keyframe comes once, and in order.
+    std::vector<int64_t> announced, came;
+    for (const Ride::Frame& frame : ride.tracked) {
+      if (frame.result.is_keyframe) {
+        announced.push_back(frame.utime);
+      }
+    }
+    for (const FinishedKeyframe& keyframe : ride.finished) {
+      came.push_back(keyframe.utime);
+    }
+    EXPECT_EQ(came, announced) << "seed " << seed;
+    ASSERT_GT(ride.finished.size(), 5u);
+
+    const Rigid3 T_odom_truth = ride.T_odom_truth();
+    for (size_t k = 0; k < ride.finished.size(); ++k) {
+      const FinishedKeyframe& keyframe = ride.finished[k];
+      const ImuState truth = ride.world.TruthAt(keyframe.utime);
+      const Rigid3 T_true = T_odom_truth * truth.T_odom_body;
+      const Vector3d rotation = LogSo3(T_true.q * keyframe.T_odom_body.q.conjugate());
+      tilt.AddNees(rotation.head<2>(), keyframe.roll_pitch_covariance);
+      for (const LandmarkDepth& landmark : keyframe.landmarks) {
+        if (const auto z = ride.world.TrueDepth(landmark.landmark_id, keyframe.utime)) {
+          const double e = landmark.inverse_depth - 1 / *z;
+          depth.Add(e * e / landmark.inverse_depth_var);
+        }
+      }
+      ASSERT_EQ(keyframe.edge.has_value(), k > 0);
+      ASSERT_EQ(keyframe.preintegration.has_value(), k > 0);
+      if (k == 0) {
+        continue;
+      }
+      // Chained edges give the published poses.
+      const FinishedKeyframe& previous = ride.finished[k - 1];
+      const Vector6d gap =
+          (previous.T_odom_body * keyframe.edge->T_previous_this).Minus(keyframe.T_odom_body);
+      EXPECT_LT(gap.norm(), 1e-9);
+      const Rigid3 T_true_edge =
+          ride.world.TruthAt(previous.utime).T_odom_body.Inverse() * truth.T_odom_body;
+      const Vector6d e = T_true_edge.Minus(keyframe.edge->T_previous_this);
+      const Matrix6d& C = keyframe.edge->covariance;
+      edge.AddNees(e, C);
+      edge_position.AddNees(e.head<3>(), C.topLeftCorner<3, 3>());
+      edge_rotation.AddNees(e.tail<3>(), C.bottomRightCorner<3, 3>());
+      // The inertial measurement of the same span, corrected for the true biases.
+      const ImuState before = ride.world.TruthAt(previous.utime);
+      const CorrectedDelta delta =
+          CorrectForBias(*keyframe.preintegration, before.gyro_bias, before.accel_bias);
+      const Eigen::Quaterniond dq = before.T_odom_body.q.conjugate() * truth.T_odom_body.q;
+      preintegrated.Add(LogSo3(delta.q.conjugate() * dq).norm());
+    }
+    edges.push_back(edge.value());
+    edge_positions.push_back(edge_position.value());
+    edge_rotations.push_back(edge_rotation.value());
+    tilts.push_back(tilt.value());
+    depths.push_back(depth.value());
+  }
+  ExpectHonest("edges", edges);
+  ExpectHonest("edges' positions", edge_positions);
+  ExpectHonest("edges' rotations", edge_rotations);
+  ExpectHonest("tilts", tilts);
+  ExpectHonest("depths", depths);
+  EXPECT_LT(preintegrated.value(), 2e-3);
 }
 
 }  // namespace

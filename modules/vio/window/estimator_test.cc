@@ -7,7 +7,6 @@
 #include <deque>
 #include <vector>
 
-#include "core/imu/preintegration.h"
 #include "core/median.h"
 #include "vio/window/testing/test_nees.h"
 #include "vio/window/testing/test_ride.h"
@@ -312,63 +311,6 @@ TEST(Estimator, AllowsForStampsThatJitter) {
   EXPECT_LT(jittering, 1.4 * exact);
 }
 
-TEST(Estimator, FindsATimeOffsetOfTensOfMilliseconds) {
-  for (uint64_t seed = 1; seed <= 4; ++seed) {
-    VioTestWorldOptions options;
-    options.seed = seed;
-    options.time_offset_sigma = 0.025;
-    Ride ride(options);
-    ride.Advance(100);
-    ASSERT_EQ(ride.last.state, EstimatorState::kTracking) << ride.last.reason;
-    std::cout << "time offset " << ride.world.true_time_offset_s() << " s, found "
-              << ride.estimator.camera().time_offset_s << " s after " << ride.started_s << " s\n";
-    EXPECT_NEAR(ride.estimator.camera().time_offset_s, ride.world.true_time_offset_s(), 0.003);
-  }
-}
-
-// The error is about three times the sigma that is assumed for a calibration.
-TEST(Estimator, FindsTheFocalLength) {
-  for (const uint64_t seed : {2, 3}) {
-    VioTestWorldOptions options;
-    options.seed = seed;
-    options.focal_sigma = 0.003;
-    options.centre_sigma = 0.003;
-    Ride ride(options);
-    ride.Advance(300);
-    ASSERT_EQ(ride.last.state, EstimatorState::kTracking) << ride.last.reason;
-    const CameraModel& truth = ride.world.true_intrinsics();
-    const CameraModel given = ride.world.camera(), found = ride.estimator.camera();
-    std::cout << "off by " << given.fx - truth.fx << ", " << given.cx - truth.cx << ", "
-              << given.cy - truth.cy << " px, now by " << found.fx - truth.fx << ", "
-              << found.cx - truth.cx << ", " << found.cy - truth.cy << "\n";
-    EXPECT_NEAR(found.fx / truth.fx, 1, 0.002);
-    EXPECT_NEAR(found.fy / truth.fy, 1, 0.002);
-    EXPECT_NEAR(found.cx, truth.cx, 0.6);
-    EXPECT_NEAR(found.cy, truth.cy, 0.6);
-  }
-}
-
-// A phone's lens without a calibrated distortion.
-TEST(Estimator, FindsTheDistortion) {
-  for (const uint64_t seed : {2, 3}) {
-    VioTestWorldOptions options;
-    options.seed = seed;
-    options.unknown_distortion = 0.07;
-    Ride ride(options);
-    ride.Advance(300);
-    ASSERT_EQ(ride.last.state, EstimatorState::kTracking) << ride.last.reason;
-    const CameraModel &truth = ride.world.true_intrinsics(), found = ride.estimator.camera();
-    for (const Eigen::Vector2d& pixel :
-         {Eigen::Vector2d(320, 30), Eigen::Vector2d(60, 240), Eigen::Vector2d(560, 400)}) {
-      const double error_px = truth.fx * (*found.Unproject(pixel) - *truth.Unproject(pixel)).norm();
-      const double before_px =
-          truth.fx * (*ride.world.camera().Unproject(pixel) - *truth.Unproject(pixel)).norm();
-      std::cout << before_px << " px off, now " << error_px << "\n";
-      EXPECT_LT(error_px, 0.2 * before_px);
-    }
-  }
-}
-
 TEST(Estimator, StandsStillWithoutDrift) {
   double squared_distance = 0, squared_speed = 0;
   for (const uint64_t seed : {4, 5}) {
@@ -402,78 +344,6 @@ TEST(Estimator, TheSameInputGivesTheSameOutput) {
   EXPECT_EQ(a.last.T_odom_body.t, b.last.T_odom_body.t);
   EXPECT_EQ(a.last.T_odom_body.q.coeffs(), b.last.T_odom_body.q.coeffs());
   EXPECT_EQ(a.finished.size(), b.finished.size());
-}
-
-TEST(Estimator, KeyframesAreCompleteConsistentAndHonest) {
-  std::vector<double> edges, edge_positions, edge_rotations, tilts, depths;  // the rides' means
-  Mean preintegrated;
-  for (const Ride& ride : TenRides()) {
-    Mean edge, edge_position, edge_rotation, tilt, depth;
-    const uint64_t seed = ride.world.options().seed;
-    ASSERT_FALSE(ride.tracked.empty()) << "seed " << seed << ": " << ride.last.reason;
-
-    // Every announced keyframe comes once, and in order.
-    std::vector<int64_t> announced, came;
-    for (const Ride::Frame& frame : ride.tracked) {
-      if (frame.result.is_keyframe) {
-        announced.push_back(frame.utime);
-      }
-    }
-    for (const FinishedKeyframe& keyframe : ride.finished) {
-      came.push_back(keyframe.utime);
-    }
-    EXPECT_EQ(came, announced) << "seed " << seed;
-    ASSERT_GT(ride.finished.size(), 5u);
-
-    const Rigid3 T_odom_truth = ride.T_odom_truth();
-    for (size_t k = 0; k < ride.finished.size(); ++k) {
-      const FinishedKeyframe& keyframe = ride.finished[k];
-      const ImuState truth = ride.world.TruthAt(keyframe.utime);
-      const Rigid3 T_true = T_odom_truth * truth.T_odom_body;
-      const Vector3d rotation = LogSo3(T_true.q * keyframe.T_odom_body.q.conjugate());
-      tilt.AddNees(rotation.head<2>(), keyframe.roll_pitch_covariance);
-      for (const LandmarkDepth& landmark : keyframe.landmarks) {
-        if (const auto z = ride.world.TrueDepth(landmark.landmark_id, keyframe.utime)) {
-          const double e = landmark.inverse_depth - 1 / *z;
-          depth.Add(e * e / landmark.inverse_depth_var);
-        }
-      }
-      ASSERT_EQ(keyframe.edge.has_value(), k > 0);
-      ASSERT_EQ(keyframe.preintegration.has_value(), k > 0);
-      if (k == 0) {
-        continue;
-      }
-      // Chained edges give the published poses.
-      const FinishedKeyframe& previous = ride.finished[k - 1];
-      const Vector6d gap =
-          (previous.T_odom_body * keyframe.edge->T_previous_this).Minus(keyframe.T_odom_body);
-      EXPECT_LT(gap.norm(), 1e-9);
-      const Rigid3 T_true_edge =
-          ride.world.TruthAt(previous.utime).T_odom_body.Inverse() * truth.T_odom_body;
-      const Vector6d e = T_true_edge.Minus(keyframe.edge->T_previous_this);
-      const Matrix6d& C = keyframe.edge->covariance;
-      edge.AddNees(e, C);
-      edge_position.AddNees(e.head<3>(), C.topLeftCorner<3, 3>());
-      edge_rotation.AddNees(e.tail<3>(), C.bottomRightCorner<3, 3>());
-      // The inertial measurement of the same span, corrected for the true biases.
-      const ImuState before = ride.world.TruthAt(previous.utime);
-      const CorrectedDelta delta =
-          CorrectForBias(*keyframe.preintegration, before.gyro_bias, before.accel_bias);
-      const Eigen::Quaterniond dq = before.T_odom_body.q.conjugate() * truth.T_odom_body.q;
-      preintegrated.Add(LogSo3(delta.q.conjugate() * dq).norm());
-    }
-    edges.push_back(edge.value());
-    edge_positions.push_back(edge_position.value());
-    edge_rotations.push_back(edge_rotation.value());
-    tilts.push_back(tilt.value());
-    depths.push_back(depth.value());
-  }
-  ExpectHonest("edges", edges);
-  ExpectHonest("edges' positions", edge_positions);
-  ExpectHonest("edges' rotations", edge_rotations);
-  ExpectHonest("tilts", tilts);
-  ExpectHonest("depths", depths);
-  EXPECT_LT(preintegrated.value(), 2e-3);
 }
 
 }  // namespace

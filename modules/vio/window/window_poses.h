@@ -17,4 +17,7 @@ struct WindowPoses {
   Eigen::MatrixXd covariance;
 };
 
+struct WindowProblem;
+WindowPoses PosesOf(const WindowProblem& problem);
+
 }  // namespace pangea::vio
