@@ -128,14 +128,13 @@ endfunction()
 set(test_files ${CMAKE_BINARY_DIR}/tmp)
 file(MAKE_DIRECTORY ${test_files})
 
-# pangea_test(name [SEPARATE] SOURCES ... DEPENDS ... [LABEL unit|system|slow] [TIMEOUT s]) defines
-# one GoogleTest binary. SEPARATE compiles each source by itself, because several define the same
-# names. The label is unit and the timeout 120 s if they are not given.
+# pangea_test(name SOURCES ... DEPENDS ... [LABEL unit|system|slow] [TIMEOUT s]) defines one GoogleTest
+# binary. The label is unit and the timeout 120 s if they are not given.
 function(pangea_test name)
   if(EMSCRIPTEN)
     return()
   endif()
-  cmake_parse_arguments(ARG "SEPARATE" "LABEL;TIMEOUT" "SOURCES;DEPENDS" ${ARGN})
+  cmake_parse_arguments(ARG "" "LABEL;TIMEOUT" "SOURCES;DEPENDS" ${ARGN})
   if(NOT ARG_LABEL)
     set(ARG_LABEL unit)
   endif()
@@ -146,9 +145,6 @@ function(pangea_test name)
     math(EXPR ARG_TIMEOUT "10 * ${ARG_TIMEOUT}")
   endif()
   add_executable(${name} ${ARG_SOURCES})
-  if(ARG_SEPARATE)
-    set_target_properties(${name} PROPERTIES UNITY_BUILD OFF)
-  endif()
   # A test spends its time in the libraries; with -O1, its own code compiles a third faster.
   target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-O1>)
   pangea_include_root(root)

@@ -9,10 +9,10 @@ namespace pangea {
 namespace {
 
 constexpr AnchorId kA{2, 1}, kB{2, 2};
-constexpr MapId kMap{1, 1000};
+constexpr MapId kAnchorMap{1, 1000};
 
 std::vector<uint8_t> Message(const AnchorId& id, int64_t revision, bool gone = false) {
-  AnchorState state = TestAnchor(id, revision, kMap);
+  AnchorState state = TestAnchor(id, revision, kAnchorMap);
   state.gone = gone;
   return EncodeMessage(ToMessage(state));
 }

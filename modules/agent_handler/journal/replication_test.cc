@@ -5,10 +5,10 @@
 namespace pangea {
 namespace {
 
-const MapId kMap{3, 1'700'000'000'000'000};
+const MapId kReplicatedMap{3, 1'700'000'000'000'000};
 
 Replication::Group GroupOf(int64_t journal_bytes, int32_t seq) {
-  return {journal_bytes, {{kMap, seq}}, seq};
+  return {journal_bytes, {{kReplicatedMap, seq}}, seq};
 }
 
 TEST(Replication, WithoutOtherHostsWhatTheDiskHasIsKept) {
@@ -16,7 +16,7 @@ TEST(Replication, WithoutOtherHostsWhatTheDiskHasIsKept) {
   EXPECT_TRUE(replication.Works(0));
   replication.Add(GroupOf(2000, 1));
   EXPECT_EQ(replication.TakeKept().size(), 1u);
-  EXPECT_FALSE(replication.Awaits(kMap.agent_id));
+  EXPECT_FALSE(replication.Awaits(kReplicatedMap.agent_id));
 }
 
 TEST(Replication, WhatOthersHaveIsKeptAndNothingBeyond) {
@@ -28,13 +28,13 @@ TEST(Replication, WhatOthersHaveIsKeptAndNothingBeyond) {
   const auto kept = replication.TakeKept();
   ASSERT_EQ(kept.size(), 1u);
   EXPECT_EQ(kept.front().num_edits, 1);
-  EXPECT_TRUE(replication.Awaits(kMap.agent_id));
-  EXPECT_FALSE(replication.Awaits(kMap.agent_id + 1));
+  EXPECT_TRUE(replication.Awaits(kReplicatedMap.agent_id));
+  EXPECT_FALSE(replication.Awaits(kReplicatedMap.agent_id + 1));
   replication.OnReplicated(2000, 0);
   EXPECT_TRUE(replication.TakeKept().empty()) << "an older one";
   replication.OnReplicated(3000, 0);
   EXPECT_EQ(replication.TakeKept().size(), 1u);
-  EXPECT_FALSE(replication.Awaits(kMap.agent_id));
+  EXPECT_FALSE(replication.Awaits(kReplicatedMap.agent_id));
 }
 
 TEST(Replication, WorksOnceTheStartIsReplicatedUntilTheBridgeIsSilent) {
