@@ -62,6 +62,40 @@ Matrix4d InverseBlock(const SparseFactor& factor, const Eigen::VectorXd& D, int 
   return block;
 }
 
+// What is known of a node that nothing holds: these sigmas (m, m, m, rad).
+const Vector4d kUnknownSigmas(100, 100, 100, 3.2);
+
+bool IsKnown(const Matrix4d& covariance) {
+  return covariance.allFinite() && (covariance.diagonal().array() > 0).all() &&
+         (covariance.diagonal().array() <= kUnknownSigmas.array().square()).all();
+}
+
+// The blocks at these columns of the inverse of H. False if H is singular, or nearly so.
+bool InverseBlocks(const Eigen::SparseMatrix<double>& H, const std::vector<int>& columns,
+                   std::vector<Matrix4d>* blocks) {
+  const SparseFactor factor(H);
+  if (factor.info() != Eigen::Success) {
+    return false;
+  }
+  const Eigen::VectorXd D = factor.vectorD();
+  bool known = true;
+  for (size_t i = 0; i < columns.size(); ++i) {
+    if (columns[i] >= 0) {
+      (*blocks)[i] = InverseBlock(factor, D, columns[i]);
+      known = known && IsKnown((*blocks)[i]);
+    }
+  }
+  return known;
+}
+
+// H with a prior of kUnknownSigmas on each of the first `num_nodes` blocks of four columns.
+Eigen::SparseMatrix<double> WithPriors(Eigen::SparseMatrix<double> H, int num_nodes) {
+  for (int i = 0; i < 4 * num_nodes; ++i) {
+    H.coeffRef(i, i) += 1 / (kUnknownSigmas[i % 4] * kUnknownSigmas[i % 4]);
+  }
+  return H;
+}
+
 }  // namespace
 
 GroupSolver::GroupSolver() : problem_(std::make_unique<ceres::Problem>()) {}
@@ -205,6 +239,7 @@ std::vector<Matrix4d> GroupSolver::Marginals(const std::vector<int>& nodes) cons
   if (blocks.empty()) {
     return marginals;
   }
+  const auto num_nodes = static_cast<int>(blocks.size());
   for (const double& scale : scales_) {
     blocks.push_back(const_cast<double*>(&scale));
   }
@@ -216,15 +251,13 @@ std::vector<Matrix4d> GroupSolver::Marginals(const std::vector<int>& nodes) cons
       crs.num_rows, crs.num_cols, static_cast<int>(crs.values.size()), crs.rows.data(),
       crs.cols.data(), crs.values.data());
   const Eigen::SparseMatrix<double> H = J.transpose() * J;
-  const SparseFactor factor(H);
-  if (factor.info() != Eigen::Success) {
-    return marginals;
+  std::vector<int> columns;
+  for (const int node : nodes) {
+    columns.push_back(column[node]);
   }
-  const Eigen::VectorXd D = factor.vectorD();
-  for (size_t i = 0; i < nodes.size(); ++i) {
-    if (column[nodes[i]] >= 0) {
-      marginals[i] = InverseBlock(factor, D, column[nodes[i]]);
-    }
+  // Singular if the loops that hold a map are all switched off.
+  if (!InverseBlocks(H, columns, &marginals)) {
+    InverseBlocks(WithPriors(H, num_nodes), columns, &marginals);
   }
   return marginals;
 }

@@ -32,5 +32,29 @@ TEST(GroupSolver, MarginalsOfAClosedChain) {
   }
 }
 
+// With its only loop switched off, nothing says where the second chain is.
+TEST(GroupSolver, MarginalsOfAChainThatNothingHolds) {
+  Relative4 same_place;
+  same_place.covariance = 1e-2 * Matrix4d::Identity();
+  Relative4 far = same_place;
+  far.t.x() = 50;
+  GroupSolver solver;
+  const int fixed = solver.AddNode({}, true);
+  const int held = solver.AddNode({}, false);
+  solver.AddOdometry(fixed, held, same_place);
+  const int first = solver.AddNode({}, false);
+  const int second = solver.AddNode({}, false);
+  solver.AddOdometry(first, second, same_place);
+  solver.AddLoop(fixed, first, far, false);
+  solver.SolveWarm({true});
+  ASSERT_FALSE(solver.loop_on(0));
+  const std::vector<Matrix4d> marginals = solver.Marginals({held, second});
+  EXPECT_LT((marginals[0] - same_place.covariance).norm(), 1e-4);
+  for (int i = 0; i < 4; ++i) {
+    EXPECT_GT(marginals[1](i, i), 1) << i;
+    EXPECT_LT(marginals[1](i, i), 1e5) << i;
+  }
+}
+
 }  // namespace
 }  // namespace pangea
