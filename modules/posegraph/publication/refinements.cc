@@ -6,20 +6,39 @@
 namespace pangea {
 namespace {
 
+using PointPairs = std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>>;
+
+Rigid3 SolvedPose(const GraphMap& map, int node) {
+  const Pose4& solved = map.poses[node];
+  return {YawRotation(solved.yaw) * map.chain[node].T_odom_body.q, solved.p};
+}
+
+// A keyframe counts by points around its body, so that also rotations show the yaw: the positions
+// of an agent that stands still do not.
+void AddPointsAround(const Rigid3& to, const Rigid3& from, PointPairs* pairs) {
+  constexpr double kArm_m = 1;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const double arm : {-kArm_m, kArm_m}) {
+      const Eigen::Vector3d p_body = arm * Eigen::Vector3d::Unit(axis);
+      pairs->emplace_back(to * p_body, from * p_body);
+    }
+  }
+}
+
 // Fits the whole refinement to the solution and adds its poses to `told`.
 void Lay(const Refinement& refinement, const GraphMaps& maps, std::map<int, RefinedMap>* told) {
   std::vector<std::pair<NodeRef, Rigid3>> nodes;
-  std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> positions;
+  PointPairs points;
   for (const auto& [id, pose] : refinement.poses()) {
     if (const std::optional<NodeRef> node = maps.Find(id)) {
       nodes.emplace_back(*node, pose);
-      positions.emplace_back(maps[node->map].poses[node->node].p, pose.t);
+      AddPointsAround(SolvedPose(maps[node->map], node->node), pose, &points);
     }
   }
   if (nodes.empty()) {
     return;
   }
-  const Rigid3 T_map_refined = FitYawAndShift(positions).ToRigid3();
+  const Rigid3 T_map_refined = FitYawAndShift(points).ToRigid3();
   for (const auto& [node, pose] : nodes) {
     told->at(node.map).Add(node.node, T_map_refined * pose);
   }

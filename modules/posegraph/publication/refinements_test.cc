@@ -52,6 +52,23 @@ TEST(Refinements, AreLaidOnTheSolutionWhereTheirMapsAreOneGroup) {
   EXPECT_LT((apart.at(1).T_map_body(2).t - Eigen::Vector3d(2, 0, 0)).norm(), 1e-12);
 }
 
+// The positions of an agent that stands still show no yaw: the noise of both is all they show.
+TEST(Refinements, OfAnAgentThatStandsStillKeepsItsYaw) {
+  GraphMaps maps;
+  maps.Add(RowId(1));
+  MapState refined = Stretched({1}, 4);
+  for (int seq = 0; seq < 3; ++seq) {
+    Keyframe keyframe = InARow(RowId(1), seq);
+    keyframe.T_odom_body.t *= 0.01;
+    maps[0].Add(keyframe);
+    refined.keyframes[seq].T_map_body.t = {0, -keyframe.T_odom_body.t.x(), 0};
+  }
+  Refinements refinements;
+  ASSERT_TRUE(refinements.Add(refined, maps));
+  const auto told = refinements.Refine({0}, maps);
+  EXPECT_LT(LogSo3(told.at(0).T_map_body(0).q).norm(), 0.01);
+}
+
 // Whoever made it: a bundle adjustment may be another program.
 TEST(Refinements, AKeyframeOfAMapThatItDoesNotNameIsLeftOut) {
   const GraphMaps maps = MakeRows(2, 3);
