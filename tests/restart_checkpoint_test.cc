@@ -96,7 +96,7 @@ std::unique_ptr<Process> MakeMapPoints(Bus& bus, const CheckpointPlace& checkpoi
 }
 
 std::unique_ptr<Process> MakePoseGraph(Bus& bus, const CheckpointPlace& checkpoint) {
-  return std::make_unique<PoseGraphProcess>(bus, PoseGraphOptions{}, 1, checkpoint);
+  return std::make_unique<PoseGraphProcess>(bus, PoseGraphOptions{}, std::nullopt, checkpoint);
 }
 
 struct Named {

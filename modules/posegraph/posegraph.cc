@@ -6,8 +6,11 @@
 
 namespace pangea {
 
-PoseGraph::PoseGraph(const PoseGraphOptions& options, int64_t first_revision)
-    : options_(options), pairs_(options.merge), publisher_(first_revision) {}
+PoseGraph::PoseGraph(const PoseGraphOptions& options, std::optional<int64_t> start_utime)
+    : options_(options),
+      start_utime_(start_utime),
+      pairs_(options.merge),
+      publisher_(start_utime.value_or(1)) {}
 
 int PoseGraph::NumberOf(const MapId& map) {
   const int number = maps_.Add(map);
@@ -22,6 +25,7 @@ void PoseGraph::AddKeyframe(const Keyframe& keyframe) {
   if (!maps_[number].Add(keyframe)) {
     return;
   }
+  PassEarlierRevisions(maps_[number]);
   GraphGroup& group = groups_.Of(number);
   group.solve.AddKeyframe();
   group.publication.AddKeyframe(maps_.NumKeyframes(group.maps));
@@ -138,6 +142,13 @@ PoseGraphUpdate PoseGraph::Finish() {
   return Publish(true);
 }
 
+// A replay's keyframes name the revisions of the captured run, which are not of its own.
+void PoseGraph::PassEarlierRevisions(const GraphMap& map) {
+  if (start_utime_) {
+    publisher_.PassRevision(map.known_revision);
+  }
+}
+
 PoseGraphUpdate PoseGraph::Publish(bool all_that_is_new) {
   PoseGraphUpdate update;
   for (auto& [oldest, group] : groups_.by_oldest()) {
@@ -202,11 +213,14 @@ void PoseGraph::Save(ByteWriter* writer) {
 }
 
 bool PoseGraph::Restore(ByteReader* reader) {
-  PoseGraph graph(options_, publisher_.next_revision());
+  PoseGraph graph(options_, start_utime_);
   if (!graph.Read(reader) || !reader->at_end()) {
     return false;
   }
   graph.restored_ = true;
+  for (const GraphMap& map : graph.maps_) {
+    graph.PassEarlierRevisions(map);
+  }
   *this = std::move(graph);
   return true;
 }

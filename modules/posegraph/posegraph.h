@@ -20,6 +20,7 @@
 // on counts of messages and on the calls of Update and Finish. One thread.
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "core/byte_record.h"
@@ -51,8 +52,10 @@ class PoseGraph {
     int64_t not_metric = 0;     // maps whose scale is a state of the solve
   };
 
-  // The first published state has revision `first_revision`; each later one counts up by one.
-  explicit PoseGraph(const PoseGraphOptions& options, int64_t first_revision = 1);
+  // The first published state has revision 1; each later one counts up by one. Live, it has the
+  // wall clock's time at the start, or a higher one if keyframes name those of an earlier run: so
+  // revisions increase across restarts, also if the clock went back.
+  explicit PoseGraph(const PoseGraphOptions& options, std::optional<int64_t> start_utime = {});
 
   // Additions take effect with the next Update.
 
@@ -105,10 +108,12 @@ class PoseGraph {
   void SolveRestored();
   bool UndoMerges(const GraphGroup& group);
   bool IsUsed(const Loop& loop) const { return groups_.AreOne(loop.from.map, loop.to.map); }
+  void PassEarlierRevisions(const GraphMap& map);
   PoseGraphUpdate Publish(bool all_that_is_new);
   bool Read(ByteReader* reader);
 
   PoseGraphOptions options_;
+  std::optional<int64_t> start_utime_;
   GraphMaps maps_;
   GraphLoops loops_;
   MapPairs pairs_;

@@ -12,15 +12,16 @@
 namespace pangea {
 namespace {
 
-constexpr uint32_t kCheckpointFormat = 4;
+constexpr uint32_t kCheckpointFormat = 5;
 constexpr int64_t kSecond = 1'000'000;
 
 }  // namespace
 
 PoseGraphProcess::PoseGraphProcess(Bus& bus, const PoseGraphOptions& options,
-                                   int64_t first_revision, const CheckpointPlace& checkpoint)
+                                   std::optional<int64_t> start_utime,
+                                   const CheckpointPlace& checkpoint)
     : node_(bus, "posegraph"),
-      graph_(options, first_revision),
+      graph_(options, start_utime),
       journal_(node_,
                {.in_order = true,
                 .gives_up = true,

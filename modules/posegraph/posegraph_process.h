@@ -24,6 +24,7 @@
 // Bounds: ReorderBuffer bounds the buffered keyframes, DueResults the promised results,
 // ReceivedConstraints the constraints that wait for keyframes.
 
+#include <optional>
 #include <string>
 
 #include "bus/node.h"
@@ -39,10 +40,9 @@ namespace pangea {
 
 class PoseGraphProcess : public Process {
  public:
-  // Live, `first_revision` is the wall clock at the start, so that revisions increase across
-  // restarts.
-  PoseGraphProcess(Bus& bus, const PoseGraphOptions& options, int64_t first_revision = 1,
-                   const CheckpointPlace& checkpoint = {});
+  // `start_utime`: only live (PoseGraph).
+  PoseGraphProcess(Bus& bus, const PoseGraphOptions& options,
+                   std::optional<int64_t> start_utime = {}, const CheckpointPlace& checkpoint = {});
 
   void Tick(int64_t now_utime) override;
   // Solves and publishes everything that is still due; a second call publishes nothing.

@@ -4,6 +4,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <limits>
 #include <random>
 
 #include "posegraph/posegraph_test_world.h"
@@ -17,6 +18,39 @@ double OdometryAte(const SyntheticWorld& world, int agent) {
     state.keyframes.push_back({keyframe.id, keyframe.utime, keyframe.T_odom_body});
   }
   return JointAte(world, state);
+}
+
+// As after a restart: the keyframes name the correction that an earlier run published.
+Keyframe Corrected(const SyntheticWorld& world, int64_t revision) {
+  Keyframe keyframe = world.agents[0].keyframes[0];
+  keyframe.group_revision = revision;
+  return keyframe;
+}
+
+// Agents ignore a revision that is not higher than the one they have.
+TEST(PoseGraph, RevisionsGoOnBehindThoseOfAnEarlierRunAlsoIfTheClockWentBack) {
+  const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(1, 1));
+  const int64_t utime = 1000;
+  const auto first_after = [&](int64_t known) {
+    PoseGraph graph({}, utime);
+    graph.AddKeyframe(Corrected(world, known));
+    return graph.Finish().states.at(0).revision;
+  };
+  EXPECT_EQ(first_after(999), utime);
+  EXPECT_GT(first_after(5000), 5000);
+  EXPECT_EQ(first_after(std::numeric_limits<int64_t>::max()), utime) << "an agent that lies";
+
+  PoseGraph before({}, utime), restored({}, utime), replayed({});
+  before.AddKeyframe(Corrected(world, 5000));
+  ByteRecordWriter writer;
+  before.Save(&writer);
+  const std::vector<uint8_t> bytes = writer.Take();
+  ByteRecordReader reader(bytes);
+  ASSERT_TRUE(restored.Restore(&reader));
+  EXPECT_GT(restored.Finish().states.at(0).revision, 5000);
+
+  replayed.AddKeyframe(Corrected(world, 5000));
+  EXPECT_EQ(replayed.Finish().states.at(0).revision, 1);
 }
 
 TEST(PoseGraph, ALoneMapIsWhereItsOdometrySays) {

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <optional>
 #include <random>
 
 #include "core/testing/synthetic_world.h"
@@ -46,7 +47,7 @@ struct TestBus : LocalBus {
 
 // A server bus with the process, and all messages that the process publishes.
 struct Server {
-  explicit Server(int64_t first_revision = 1) : process(bus, {}, first_revision) {
+  explicit Server(std::optional<int64_t> start_utime = {}) : process(bus, {}, start_utime) {
     bus.Subscribe(".*", [this](const std::string& channel, Bytes data) {
       if (channel == "MAP_STATE") {
         DecodeMessage(data, &states.emplace_back());

@@ -1,5 +1,7 @@
 #include "posegraph/graph/graph_maps.h"
 
+#include <algorithm>
+
 #include "posegraph/solver/four_dof_record.h"
 
 namespace pangea {
@@ -9,6 +11,7 @@ bool GraphMap::Add(const Keyframe& keyframe) {
     return false;
   }
   poses.push_back(PoseOf(static_cast<int>(chain.size()) - 1));
+  known_revision = std::max(known_revision, keyframe.group_revision);
   return true;
 }
 
@@ -64,6 +67,7 @@ void GraphMaps::Save(ByteWriter* writer) const {
     writer->Put(map.log_scale);
     writer->Put(map.newest_solved);
     writer->Put(map.covariance);
+    writer->Put(map.known_revision);
   }
 }
 
@@ -82,6 +86,7 @@ bool GraphMaps::Restore(ByteReader* reader) {
     reader->Get(&map.log_scale);
     reader->Get(&map.newest_solved);
     reader->Get(&map.covariance);
+    reader->Get(&map.known_revision);
     if (!is_chain || map.poses.size() != map.chain.size() ||
         map.newest_solved >= static_cast<int>(map.chain.size())) {
       return false;

@@ -27,6 +27,7 @@ struct GraphMap {
   double log_scale = 0;  // p_map = T_map_odom * (exp(log_scale) p_odom)
   int newest_solved = -1;
   Matrix4d covariance = Matrix4d::Zero();  // of T_map_odom, (x, y, z, yaw)
+  int64_t known_revision = 0;  // highest Keyframe::group_revision: the agent has this correction
   // Number of the oldest map of the group in which this map was last solved; not saved in a
   // checkpoint.
   int solved_with = 0;

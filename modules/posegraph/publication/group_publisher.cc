@@ -47,6 +47,17 @@ MapState GroupPublisher::StateOf(const GraphGroup& group, const GraphMaps& maps,
   return state;
 }
 
+void GroupPublisher::PassRevision(int64_t earlier) {
+  // Revisions begin at the wall clock (microseconds), so this is in the year 2112: only an agent
+  // that lies names a higher one.
+  constexpr int64_t kMaxCredible = int64_t{1} << 52;
+  // The earlier run has published a few more that no keyframe names.
+  constexpr int64_t kMargin = 1'000'000;
+  if (earlier >= next_revision_ && earlier <= kMaxCredible) {
+    next_revision_ = earlier + kMargin;
+  }
+}
+
 MapState GroupPublisher::StateOf(const GraphGroup& group, const GraphMaps& maps,
                                  const GraphLoops& loops) const {
   return StateOf(group, maps, loops, refinements_.Refine(group.maps, maps));

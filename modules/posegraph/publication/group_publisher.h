@@ -37,6 +37,8 @@ class GroupPublisher {
   void Publish(GraphGroup* group, const GraphMaps& maps, const GraphLoops& loops,
                PoseGraphUpdate* update);
 
+  // An earlier run published this revision: the next ones are higher.
+  void PassRevision(int64_t earlier);
   int64_t next_revision() const { return next_revision_; }
 
  private:
