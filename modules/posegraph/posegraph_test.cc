@@ -53,6 +53,18 @@ TEST(PoseGraph, RevisionsGoOnBehindThoseOfAnEarlierRunAlsoIfTheClockWentBack) {
   EXPECT_EQ(replayed.Finish().states.at(0).revision, 1);
 }
 
+// Else its agent would keep the correction of a merge that is no more.
+TEST(PoseGraph, ALoneMapThatAnEarlierRunCorrectedIsToldThatItIsAlone) {
+  const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(1, 1));
+  PoseGraph graph({}, 1000);
+  graph.AddKeyframe(Corrected(world, 5000));
+  const PoseGraphUpdate update = graph.Finish();
+  ASSERT_EQ(update.corrections.size(), 1u);
+  EXPECT_EQ(update.corrections[0].group, world.agents[0].map);
+  EXPECT_EQ(update.corrections[0].T_map_odom.t, Eigen::Vector3d(0, 0, 0));
+  EXPECT_EQ(update.corrections[0].T_map_odom.q.w(), 1);
+}
+
 TEST(PoseGraph, ALoneMapIsWhereItsOdometrySays) {
   const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(1, 25));
   PoseGraph graph({});

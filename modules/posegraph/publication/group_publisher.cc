@@ -74,7 +74,8 @@ void GroupPublisher::Publish(GraphGroup* group, const GraphMaps& maps, const Gra
   ++next_revision_;
   for (const int number : group->maps) {
     const GraphMap& map = maps[number];
-    if (map.newest_solved < 0 && !corrected_.contains(number)) {
+    const bool corrected = corrected_.contains(number) || map.known_revision > 0;
+    if (map.newest_solved < 0 && !corrected) {
       continue;
     }
     corrected_.insert(number);

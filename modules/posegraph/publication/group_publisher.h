@@ -1,8 +1,8 @@
 #pragma once
 
 // Makes the published messages of a group: its state, with a new revision each time, and one
-// correction per map. A map that is alone and was never corrected gets no correction: its map frame
-// is its odom.
+// correction per map. A map that is alone and was never corrected, by this run or an earlier one,
+// gets no correction: its map frame is its odom.
 
 #include <cstdint>
 #include <map>
