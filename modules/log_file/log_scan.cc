@@ -1,5 +1,6 @@
 #include "log_file/log_scan.h"
 
+#include <fmt/format.h>
 #include <sys/stat.h>
 
 #include <algorithm>
@@ -20,6 +21,15 @@ constexpr std::array<uint8_t, 4> kMagicBytes = {
     static_cast<uint8_t>(kLogMagic >> 24), static_cast<uint8_t>(kLogMagic >> 16 & 0xff),
     static_cast<uint8_t>(kLogMagic >> 8 & 0xff), static_cast<uint8_t>(kLogMagic & 0xff)};
 
+// The first byte from `offset` on that the disk does not give, to the size of a sector.
+int64_t FirstUnreadable(int fd, int64_t offset) {
+  std::array<uint8_t, 512> sector{};
+  while (ReadFully(fd, offset, sector.data(), sector.size())) {
+    offset += static_cast<int64_t>(sector.size());
+  }
+  return offset;
+}
+
 }  // namespace
 
 LogScan::LogScan(int fd) : fd_(fd) {
@@ -38,7 +48,10 @@ Bytes LogScan::Peek(int64_t offset, size_t size) {
     window_.resize(std::min(std::max(size, kReadAhead), left));
     window_offset_ = offset;
     if (!ReadFully(fd_, offset, window_.data(), window_.size())) {
-      throw std::runtime_error(errno != 0 ? std::strerror(errno) : "the file has become shorter");
+      const int error = errno;
+      throw std::runtime_error(error != 0 ? fmt::format("{} at byte {}", std::strerror(error),
+                                                        FirstUnreadable(fd_, offset))
+                                          : "the file has become shorter");
     }
   }
   return Bytes(window_).subspan(static_cast<size_t>(offset - window_offset_));

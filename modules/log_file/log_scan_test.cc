@@ -1,8 +1,10 @@
 #include "log_file/log_scan.h"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <stdlib.h>
+#include <sys/mman.h>
 #include <unistd.h>
 
 #include <random>
@@ -156,6 +158,27 @@ TEST_F(LogScanTest, EventsLargerThanWhatIsReadAheadAreWhole) {
   EXPECT_THAT(Scan().events, testing::ElementsAre(0, 1, 2));
   file[(3 << 20) + 100] ^= 1;
   EXPECT_THAT(Scan().events, testing::IsSupersetOf({0, 2}));
+}
+
+// A page that is not mapped is read like a bad sector: the kernel says EIO.
+TEST(LogScan, NamesTheByteThatTheDiskDoesNotGive) {
+  const auto page = static_cast<size_t>(sysconf(_SC_PAGESIZE));
+  void* const pages = mmap(nullptr, 3 * page, PROT_READ, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  ASSERT_NE(pages, MAP_FAILED);
+  ASSERT_EQ(munmap(static_cast<char*>(pages) + 2 * page, page), 0);
+  const int fd = open("/proc/self/mem", O_RDONLY);
+  ASSERT_GE(fd, 0);
+  const auto begin = reinterpret_cast<int64_t>(pages);
+  const auto bad = begin + static_cast<int64_t>(2 * page);
+  LogScan scan(fd, begin, begin + static_cast<int64_t>(3 * page));
+  try {
+    scan.Next();
+    ADD_FAILURE() << "was read";
+  } catch (const std::runtime_error& error) {
+    EXPECT_EQ(error.what(), "Input/output error at byte " + std::to_string(bad));
+  }
+  close(fd);
+  munmap(pages, 2 * page);
 }
 
 }  // namespace

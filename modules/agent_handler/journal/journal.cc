@@ -92,7 +92,12 @@ void Journal::Load(const Visitor& visitor, const std::function<void()>& before_m
   try {
     parts = Scan(visitor);
   } catch (const std::runtime_error& error) {
-    throw std::runtime_error(fmt::format("cannot read the journal '{}': {}", path_, error.what()));
+    // Nothing is written: a cable may be loose, and a disk that fails may lose more by it.
+    throw std::runtime_error(fmt::format(
+        "cannot read the journal '{0}': {1}: nothing was changed; if it stays so, put a "
+        "copy in its place (dd if='{0}' of=COPY bs=4096 conv=noerror,sync): only what "
+        "cannot be read is lost, and agents send again what they have",
+        path_, error.what()));
   }
   const bool has_events = SizeOf(parts) < synced_bytes_;
   if (synced_bytes_ > 0 && !has_events && !BeginsAsLogEvent(fd_, 0, synced_bytes_)) {
