@@ -73,7 +73,7 @@ std::string AgentHandler::OnHello(const LinkPacket& packet) {
     return hello.refused;
   }
   software_ = hello.value->software;
-  receiver_.OnHello(*hello.value);
+  std::string refused = receiver_.OnHello(*hello.value);
   for (const LinkMap& map : hello.value->maps) {
     slots_[map.slot] = map.map;
     const auto it = corrections_.find(map.map);
@@ -82,7 +82,7 @@ std::string AgentHandler::OnHello(const LinkPacket& packet) {
     }
   }
   hello_since_ack_ = true;
-  return "";
+  return refused;
 }
 
 std::string AgentHandler::OnPiece(const LinkPacket& packet) {

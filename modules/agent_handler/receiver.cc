@@ -1,5 +1,7 @@
 #include "agent_handler/receiver.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <iterator>
 
@@ -40,7 +42,7 @@ void Receiver::Resume(const MapId& map_id, int32_t journalled_seq,
   maps_[map_id] = std::move(map);
 }
 
-void Receiver::OnHello(const LinkHello& hello) {
+std::string Receiver::OnHello(const LinkHello& hello) {
   // A map without keyframes that the hello no longer names is forgotten, which bounds their number.
   for (auto it = maps_.begin(); it != maps_.end();) {
     const auto& [id, map] = *it;
@@ -51,7 +53,15 @@ void Receiver::OnHello(const LinkHello& hello) {
   for (auto& [id, map] : maps_) {
     map.in_hello = false;
   }
+  std::string refused;
   for (const LinkMap& announced : hello.maps) {
+    if (!maps_.contains(announced.map) && maps_.size() >= kMaxMaps) {
+      refused = fmt::format(
+          "hello: agent {} has {} maps already, and no more are taken: give it another id "
+          "(pangea-agent-handler keygen)",
+          announced.map.agent_id, maps_.size());
+      continue;
+    }
     ReceivedMap& map = maps_[announced.map];
     map.announced = map.in_hello = true;
     if (announced.first_seq > map.next && map.next == map.journalled + 1) {
@@ -72,6 +82,7 @@ void Receiver::OnHello(const LinkHello& hello) {
       Erase(entry);
     }
   }
+  return refused;
 }
 
 void Receiver::OnNewUplink() {

@@ -25,6 +25,9 @@ struct ReceiverOptions {
 
 class Receiver {
  public:
+  // Of one agent; each costs memory in every process of the server. One a minute for a week.
+  static constexpr size_t kMaxMaps = 10'000;
+
   // Returns why a complete (compressed) message is not a valid keyframe with this id; empty if it
   // is.
   using Check = std::function<std::string(const KeyframeId&, Bytes)>;
@@ -40,8 +43,9 @@ class Receiver {
   // gaps are received first, until they are filled or given up.
   void Resume(const MapId& map, int32_t journalled_seq, const std::vector<SeqGap>& gaps = {});
   // Only maps that a hello has named are received. Keyframes that the uplink cannot deliver any
-  // more are given up here, and counted.
-  void OnHello(const LinkHello& hello);
+  // more are given up here, and counted. Returns why some maps are not received, or an empty
+  // string.
+  std::string OnHello(const LinkHello& hello);
   // In another run of the uplink, unfinished keyframes are dropped: they come again, and may be cut
   // into other pieces.
   void OnNewUplink();

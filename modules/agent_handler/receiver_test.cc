@@ -258,5 +258,21 @@ TEST(Receiver, AnnouncedMapsThatGaveUpAllTheyHadAreForgottenToo) {
   EXPECT_EQ(receiver.given_up(), 5) << "of the one that is still named";
 }
 
+TEST(Receiver, AnAgentHasABoundedNumberOfMaps) {
+  Receiver receiver({}, CheckContent);
+  const auto most = static_cast<int>(Receiver::kMaxMaps);
+  for (int i = 1; i < most; ++i) {
+    receiver.Resume({1, i}, 10);
+  }
+  const MapId last{1, most}, more{1, most + 1};
+  EXPECT_EQ(receiver.OnHello({"", {{last, 0, 0}}}), "");
+  AddAll(&receiver, {last, 0});
+  ASSERT_EQ(receiver.TakeReady().size(), 1u);
+  EXPECT_NE(receiver.OnHello({"", {{{1, 1}, 0, 0}, {last, 0, 0, 1}, {more, 0, 0, 2}}}), "");
+  EXPECT_EQ(receiver.num_maps(), Receiver::kMaxMaps);
+  EXPECT_NE(AddPiece(&receiver, {more, 0}, 0), "");
+  EXPECT_EQ(AddPiece(&receiver, {last, 1}, 0), "") << "those that it has go on";
+}
+
 }  // namespace
 }  // namespace pangea
