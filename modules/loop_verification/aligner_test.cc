@@ -190,5 +190,16 @@ TEST(Aligner, FewDepthsAreEnoughWhereCornersAreMatchedBetweenNeighbours) {
   EXPECT_FALSE(Align(c, 9, m, 10, candidate, OnlyTracked()).accepted);
 }
 
+// The limits of the views are those of the constraint, not of the guess before the adjustment.
+TEST(AlignerTest, LimitsTheDistanceOfTheResult) {
+  const TestAgent m = RunTestAgent(MakeTestRoom({}), FirstAgent(0));
+  const TestAgent c = RunTestAgent(MakeTestRoom({}), SecondAgent(0));
+  LoopVerificationReport report;
+  const Constraint constraint =
+      Align(c, 9, m, 10, MakeTestCandidate(c, 9, m, 10, 60, 10), {}, &report);
+  ASSERT_TRUE(constraint.accepted) << constraint.reason;
+  EXPECT_NEAR(report.Measured("max_distance_m"), constraint.T_from_to.t.norm(), 1e-9);
+}
+
 }  // namespace
 }  // namespace pangea

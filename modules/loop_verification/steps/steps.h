@@ -57,7 +57,7 @@ inline constexpr VerificationStep kVerificationSteps[] = {
     {"visibility in the two keyframes", Run<CheckVisibility>},
     {"joint bundle adjustment", Run<Optimise>},
     {"gravity", Run<CheckGravity>},
-    {"views of the refined guess", Run<CheckViews>},
+    {"views, adjusted", Run<CheckViews>},
     {"gate of the kind, adjusted", Run<CheckDrift>},
     {"inliers", Run<CheckInliers>},
     {"certainty", Run<CheckCertainty>},

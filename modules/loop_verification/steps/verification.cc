@@ -63,8 +63,7 @@ std::string CheckDrift(const CommonStepOptions& /*options*/, Verification* verif
   // A window frame is the odom frame, shifted to the newest keyframe's body.
   const Rigid3 T_odom_m(Eigen::Quaterniond::Identity(), m.newest_keyframe().T_odom_body.t);
   const Rigid3 T_odom_c(Eigen::Quaterniond::Identity(), c.newest_keyframe().T_odom_body.t);
-  const Rigid3& T_m_c = verification->ba ? verification->ba->T_m_c : verification->pose.T_m_c;
-  return verification->drift_gate->Check(T_odom_m * T_m_c * T_odom_c.Inverse());
+  return verification->drift_gate->Check(T_odom_m * verification->T_m_c() * T_odom_c.Inverse());
 }
 
 }  // namespace pangea

@@ -7,7 +7,7 @@ namespace pangea {
 
 std::string CheckViews(const ViewOptions& options, Verification* verification) {
   const auto& [m, c] = verification->windows;
-  const Rigid3& T_m_c = verification->pose.T_m_c;
+  const Rigid3& T_m_c = verification->T_m_c();
   const Eigen::Vector3d axis_m = m.T_w_cam.back().q * Eigen::Vector3d::UnitZ();
   const Eigen::Vector3d axis_c = T_m_c.q * (c.T_w_cam.back().q * Eigen::Vector3d::UnitZ());
   const double angle = std::acos(std::clamp(axis_m.dot(axis_c), -1.0, 1.0));
