@@ -139,11 +139,13 @@ class Recording:
         def parse(stamp, name, *_):
             """a stamp in ns, an image's name"""
             path = mav0 / "cam0/data" / name.strip()
-            if not path.is_file():
-                fail(f"{path}: is missing, and {table} names it: take that line out")
             return int(stamp) // 1000, path
 
-        return self._events(table, parse)
+        for utime, path in self._events(table, parse):
+            if path.is_file():
+                yield utime, path
+            else:
+                print(f"euroc_source: {path}: is missing, left out", file=sys.stderr)
 
 
 def play(recording, bus, agent, rate):
