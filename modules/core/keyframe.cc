@@ -1,5 +1,7 @@
 #include "core/keyframe.h"
 
+#include <utility>
+
 #include "core/median.h"
 
 namespace pangea {
@@ -13,7 +15,9 @@ const std::array<double, kNumOctaves> kOctaveScales = [] {
 }();
 
 double UnknownScaleSigma(const std::vector<double>& scale_sigmas) {
-  return scale_sigmas.empty() ? 0 : UnknownScaleSigma(Median(scale_sigmas));
+  std::vector<double> known = scale_sigmas;
+  std::erase(known, 0);
+  return known.empty() ? 0 : UnknownScaleSigma(Median(std::move(known)));
 }
 
 std::optional<Eigen::Vector3d> PointInCamera(const Keyframe& keyframe, const MapPoint& point) {

@@ -110,5 +110,17 @@ TEST(OdometryChain, OneVagueEdgeDoesNotHideTheLaterOnes) {
   EXPECT_GT(vague(3, 3), 3);     // rad^2
 }
 
+// An agent that stands still at the start sends keyframes before it knows any depth.
+TEST(OdometryChain, KeyframesThatDoNotKnowTheScaleYetDoNotMakeTheMapMetric) {
+  OdometryChain chain;
+  int seq = 0;
+  for (const double sigma : {0.0, 0.0, 0.0, 0.0, 0.2, 0.3, 0.2}) {
+    Keyframe keyframe = Along(seq++);
+    keyframe.scale_sigma = sigma;
+    chain.Add(keyframe);
+    EXPECT_EQ(chain.UnknownScale(), seq < 5 ? 0 : seq == 6 ? 0.3 : 0.2) << seq;
+  }
+}
+
 }  // namespace
 }  // namespace pangea
