@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <set>
@@ -305,8 +306,10 @@ void EurocRecording::ReadImu() {
 
 void EurocRecording::DropImagesOutsideImu() {
   const size_t before = images_.size();
-  const int64_t begin = imu_.front().utime;
-  const int64_t end = imu_.back().utime;
+  // On the clock of the images.
+  const auto offset_us = std::llround(1e6 * camera_.time_offset_s);
+  const int64_t begin = imu_.front().utime - offset_us;
+  const int64_t end = imu_.back().utime - offset_us;
   std::erase_if(images_,
                 [&](const EurocImage& image) { return image.utime < begin || image.utime > end; });
   if (images_.empty()) {

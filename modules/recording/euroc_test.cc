@@ -205,5 +205,17 @@ TEST_F(EurocTest, FieldsThatAreNotReadAreNamed) {
               ElementsAre(HasSubstr("only the first is read; keep one")));
 }
 
+// The IMU is from 0.1 s before the first image to 0.895 s after it; the last image is at 0.45 s.
+TEST_F(EurocTest, ImagesOutsideTheImusTimeAreDroppedByTheTimeOffset) {
+  const std::string camera = Text("cam0/sensor.yaml");
+  const auto count = [&](double offset_s) {
+    Write("cam0/sensor.yaml", camera + fmt::format("time_offset_s: {}\n", offset_s));
+    return EurocRecording(root_).images().size();
+  };
+  EXPECT_EQ(count(0), 10u);
+  EXPECT_EQ(count(-0.22), 7u);
+  EXPECT_EQ(count(0.62), 6u);
+}
+
 }  // namespace
 }  // namespace pangea

@@ -80,8 +80,9 @@ void Playback::Run() {
         "{}: no image between {} s and the end asked for; it is {:.1f} s long", recording_.mav0(),
         options_.start_s, 1e-6 * static_cast<double>(images.back().utime - images.front().utime)));
   }
-  while (next_imu_ < recording_.imu().size() &&
-         recording_.imu()[next_imu_].utime < images[index].utime - kImuBeforeStart_us) {
+  const int64_t imu_begin =
+      images[index].utime + ToUs(recording_.camera().time_offset_s) - kImuBeforeStart_us;
+  while (next_imu_ < recording_.imu().size() && recording_.imu()[next_imu_].utime < imu_begin) {
     ++next_imu_;
   }
   pace_.WaitUntil(WallUtime() + ToUs(options_.delay_s));
