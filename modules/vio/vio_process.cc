@@ -22,6 +22,8 @@ namespace {
 constexpr int64_t kLagToldInterval_us = 10'000'000;
 constexpr int64_t kNotableLag_us = 500'000;
 
+constexpr char kSaturated[] =
+    "the IMU is at the end of its range, and does not see the whole motion";
 constexpr char kContradicted[] =
     "the IMU feels an acceleration that the images do not show: a lift, a vehicle?";
 
@@ -82,12 +84,24 @@ void VioProcess::Open(const CameraModel& camera, const ImuNoise& noise,
 }
 
 void VioProcess::AddImage(int64_t utime, const cv::Mat& image, std::span<const ImuSample> imu) {
+  NoteSaturation(imu);
   Handle(vio_->AddImage(utime, image, imu));
 }
 
 void VioProcess::AddTracks(const TrackedFrame& frame, const cv::Mat& image,
                            std::span<const ImuSample> imu) {
+  NoteSaturation(imu);
   Handle(vio_->AddTracks(frame, image, imu));
+}
+
+void VioProcess::NoteSaturation(std::span<const ImuSample> imu) {
+  const auto found = std::ranges::count_if(
+      imu, [this](const ImuSample& sample) { return saturation_.Add(sample); });
+  saturated_ = found > 0;
+  if (saturated_) {
+    num_saturated_ += found;
+    node_.Set("imu_saturated", num_saturated_);
+  }
 }
 
 void VioProcess::Handle(const VioOutput& output) {
@@ -105,6 +119,7 @@ void VioProcess::Handle(const VioOutput& output) {
     node_.Set("initialised_ms", (output.utime - *first_image_utime_) / 1000);
   }
   doubt_ = !tracking                 ? ""
+           : saturated_              ? kSaturated
            : output.imu_contradicted ? kContradicted
                                      : UnknownScale(output.scale_sigma);
   if (output.imu_contradicted) {
@@ -216,6 +231,10 @@ std::string VioProcess::Totals() const {
                                  vio_->maps_opened(), vio_->maps_opened() == 1 ? "" : "s");
   if (tum_files_ > 1) {
     text += fmt::format("; the last of {} TUM files is {}", tum_files_, tum_file_);
+  }
+  if (num_saturated_ > 0) {
+    text +=
+        fmt::format("; {} inertial samples were at the end of the sensor's range", num_saturated_);
   }
   if (num_dropped_ > 0) {
     text += fmt::format("; {} more images were dropped, as this machine is too slow for real time",

@@ -20,6 +20,7 @@
 #include "bus/process.h"
 #include "bus/retransmission/reliable_keyframe_publisher.h"
 #include "log_file/log_writer.h"
+#include "vio/imu/saturation.h"
 #include "vio/live/map_localisation.h"
 #include "vio/live/shown_pose.h"
 #include "vio/vio.h"
@@ -96,6 +97,7 @@ class VioProcess : public Process {
   void FollowMaps(const VioOutput& output);
   void Localise(const VioOutput& output);
   void Handle(const VioOutput& output);
+  void NoteSaturation(std::span<const ImuSample> imu);
   void PublishPose(const VioOutput& output);
   void PublishKeyframe(const Keyframe& keyframe);
   void WriteTum(const VioOutput& output);
@@ -117,6 +119,9 @@ class VioProcess : public Process {
   std::string state_text_ = "waiting for images";
   std::string doubt_;             // a warning while tracking
   std::string why_not_tracking_;  // at the newest image
+  SaturationDetector saturation_;
+  bool saturated_ = false;     // in the samples of the newest image
+  int64_t num_saturated_ = 0;  // samples
   int64_t num_images_ = 0;
   int64_t num_poses_ = 0;
   int64_t num_keyframes_ = 0;

@@ -287,6 +287,31 @@ TEST_F(VioProcessTest, SaysWhyThereIsNoPose) {
             "m/s^2 on average, where gravity is 9.8");
 }
 
+TEST_F(VioProcessTest, SaysThatTheImuIsAtTheEndOfItsRange) {
+  VioProcess process(bus_, options_, 0);
+  process.Open(world_.camera(), ImuNoise{});
+  Play(process, 0, 6);
+  process.Tick(1'000'000);
+  bus_.Drain();
+  EXPECT_EQ(Counter("imu_saturated"), -1);
+  const int64_t utime = 6'000'000;
+  std::vector<ImuSample> imu;
+  for (; next_imu_ <= utime; next_imu_ += kImuStep_us) {
+    imu.push_back(World::Sample(next_imu_));
+    imu.back().gyro.x() = 4.36;
+  }
+  process.AddTracks(world_.Frame(utime), RandomTexture(752, 480, 11), imu);
+  process.Tick(3'000'000);
+  bus_.Drain();
+  const auto found = static_cast<int64_t>(imu.size()) - 2;
+  EXPECT_EQ(Counter("imu_saturated"), found);
+  EXPECT_THAT(poses_.back().reason, ::testing::HasSubstr("the IMU is at the end of its range"));
+  EXPECT_THAT(process.Totals(),
+              ::testing::EndsWith(fmt::format("; {} inertial samples were at the end of the "
+                                              "sensor's range",
+                                              found)));
+}
+
 TEST_F(VioProcessTest, AGyroscopeInDegreesIsNamed) {
   VioProcess process(bus_, options_, 0);
   process.Open(world_.camera(), ImuNoise{});
