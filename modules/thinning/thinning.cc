@@ -48,12 +48,15 @@ void Thinning::Take(const Keyframe& keyframe, int64_t journalled_utime) {
     maps_.push_back(keyframe.id.map);
   }
   StoredMap& map = it->second;
-  if (!map.keyframes.empty() && keyframe.id.seq <= map.keyframes.back().id.seq) {
+  const auto seq_of = [](const Keyframe& stored) { return stored.id.seq; };
+  const auto at = std::ranges::lower_bound(map.keyframes, keyframe.id.seq, {}, seq_of);
+  if (at != map.keyframes.end() && at->id.seq == keyframe.id.seq) {
     return;
   }
   const bool stored = recognised_.Add(RecognisedKeyframe(keyframe));
-  map.numbers.push_back(stored ? recognised_.size() - 1 : kNotStored);
-  map.keyframes.push_back(Skeleton(keyframe));
+  map.numbers.insert(map.numbers.begin() + (at - map.keyframes.begin()),
+                     stored ? recognised_.size() - 1 : kNotStored);
+  map.keyframes.insert(at, Skeleton(keyframe));
   map.journalled_utime = std::max(map.journalled_utime, journalled_utime);
 }
 

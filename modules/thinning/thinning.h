@@ -70,7 +70,8 @@ class Thinning {
   // `records`: stores the keyframes' corners.
   Thinning(const Options& options, std::shared_ptr<RecordStore> records);
 
-  // `journalled_utime`: when the keyframe was journalled, wall clock.
+  // `journalled_utime`: when the keyframe was journalled, wall clock. One that comes behind later
+  // ones of its map, as after damage, takes its place among them.
   void Take(const Keyframe& keyframe, int64_t journalled_utime);
   void Take(const Constraint& constraint);
   void Take(const AnchorEdit& edit);

@@ -170,6 +170,21 @@ TEST_F(ThinningTest, EdgesLeadOverTheGaps) {
   }
 }
 
+// A keyframe that was lost by damage comes again, and is journalled behind later ones.
+TEST_F(ThinningTest, TheOrderInTheJournalDoesNotMatter) {
+  const ThinnedMaps in_order = MakeThinning().Thin(kNow);
+  for (SyntheticAgent& agent : world_.agents) {
+    std::ranges::rotate(agent.keyframes.begin() + 10, agent.keyframes.begin() + 12,
+                        agent.keyframes.end());
+  }
+  const ThinnedMaps thinned = MakeThinning().Thin(kNow);
+  EXPECT_EQ(thinned.gone, in_order.gone);
+  ASSERT_EQ(thinned.edges.size(), in_order.edges.size());
+  for (const auto& [id, joined] : in_order.edges) {
+    EXPECT_EQ(thinned.edges.at(id).edge->from_seq, joined.edge->from_seq) << ToString(id);
+  }
+}
+
 TEST_F(ThinningTest, DerivedConstraintsAreTrueToTheirCovariance) {
   const ThinnedMaps thinned = MakeThinning().Thin(kNow);
   const std::vector<MapState> before = States({});
