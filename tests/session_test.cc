@@ -215,6 +215,28 @@ TEST(SessionFolder, AnEarlierSessionIsMovedAside) {
   EXPECT_THAT(dot.output, HasSubstr("--out .: holds an earlier session"));
 }
 
+TEST(SessionFolder, WhatTheNextSessionNeedsIsNotMovedAside) {
+  const fs::path folder = FreshFolder("needed"), out = folder / "out";
+  fs::create_directories(out / "walk_1" / "mav0");
+  for (const char* name : {"session.lcm", "journal.lcm"}) {
+    std::ofstream(out / name) << "mine";
+  }
+  const std::string stored = "id: 1, keyframes: " + kSample;
+  const std::pair<std::string, std::string> needs[] = {
+      {stored, "--journal " + (out / "journal.lcm").string()},
+      {stored + ", recording: " + (out / "walk_1").string(), ""},
+      {"id: 1, keyframes: " + (out / "session.lcm").string(), ""}};
+  for (const auto& [agent, journal] : needs) {
+    const Outcome outcome =
+        RunCommand("pangea-session run " + WriteSession(folder, {agent}).string() +
+                   " --rate max --out " + out.string() + "/ " + journal);
+    EXPECT_EQ(outcome.exit_code, 1);
+    EXPECT_THAT(outcome.output, HasSubstr("which this one needs; give another folder"));
+    EXPECT_EQ(ReadFile(out / "journal.lcm"), "mine") << outcome.output;
+    EXPECT_FALSE(fs::exists(out.string() + ".1"));
+  }
+}
+
 // A replay checks its input before it moves any folder.
 TEST(SessionMistakes, OfAReplayLeaveTheEarlierSession) {
   const fs::path out = FreshFolder("replay_mistakes") / "out";

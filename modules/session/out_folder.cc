@@ -19,7 +19,23 @@ bool HoldsSession(const fs::path& folder) {
   return fs::exists(folder / "session.lcm") || fs::exists(folder / "recordings.json");
 }
 
+bool IsWithin(const fs::path& path, const fs::path& folder) {
+  const fs::path inside = fs::weakly_canonical(path).lexically_relative(fs::canonical(folder));
+  return !inside.empty() && *inside.begin() != "..";
+}
+
 }  // namespace
+
+void CheckNothingNeededIsIn(const fs::path& out, const std::vector<fs::path>& needed) {
+  for (const fs::path& path : needed) {
+    if (HoldsSession(out) && fs::exists(path) && IsWithin(path, out)) {
+      throw std::runtime_error(
+          fmt::format("--out {}: holds an earlier session, and with it {}, which this one needs; "
+                      "give another folder",
+                      out.string(), path.string()));
+    }
+  }
+}
 
 void CheckNothingIsReplaced(const fs::path& out, const std::vector<std::string>& names) {
   for (const std::string& name : names) {

@@ -14,6 +14,11 @@ namespace pangea::session {
 void CheckNothingIsReplaced(const std::filesystem::path& out,
                             const std::vector<std::string>& names);
 
+// Throws std::runtime_error if one of these files and folders would be moved aside with an earlier
+// session: the journal that is to be continued, for instance.
+void CheckNothingNeededIsIn(const std::filesystem::path& out,
+                            const std::vector<std::filesystem::path>& needed);
+
 // An earlier session in the folder is moved aside, so nothing is lost. If the folder is still empty
 // at the end, the earlier session is moved back.
 class OutFolder {

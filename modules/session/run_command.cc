@@ -48,6 +48,15 @@ std::vector<std::string> NamesOf(const SessionScript& script) {
   return names;
 }
 
+// The files and folders that a session reads, or continues.
+std::vector<fs::path> NeededBy(const SessionScript& script, const std::string& journal) {
+  std::vector<fs::path> needed{journal};
+  for (const AgentScript& agent : script.agents) {
+    needed.insert(needed.end(), {agent.resolved, agent.resolved_keyframes});
+  }
+  return needed;
+}
+
 int Run(const RunArguments& arguments, LogReadings* readings) {
   SessionScript script =
       ReadSessionFile(FindSessionFile(arguments.file), FolderOf(arguments.recordings));
@@ -63,6 +72,7 @@ int Run(const RunArguments& arguments, LogReadings* readings) {
     options.first_port = static_cast<uint16_t>(arguments.first_port);
   }
   CheckNothingIsReplaced(options.out, NamesOf(script));
+  CheckNothingNeededIsIn(options.out, NeededBy(script, arguments.journal));
   const OutFolder out(options.out);
   WriteRecordings(script, options.out);
   const RunSummary summary = RunSession(script, options);
