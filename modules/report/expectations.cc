@@ -34,14 +34,15 @@ std::set<int32_t> Agents(const ordered_json& group) {
   return group.at("agents").get<std::set<int32_t>>();
 }
 
-// Whether one group has maps of all these agents. `group_of`: by map, "AGENT/OPENED".
+// Whether one group has maps of all these agents, and perhaps of agents of earlier sessions.
+// `group_of`: by map, "AGENT/OPENED".
 bool Together(const std::map<std::string, size_t>& group_of, const std::set<int32_t>& agents) {
   std::map<size_t, std::set<int32_t>> groups;
   for (const auto& [map, group] : group_of) {
     groups[group].insert(std::stoi(map));
   }
-  return std::ranges::any_of(groups,
-                             [&agents](const auto& group) { return group.second == agents; });
+  return std::ranges::any_of(
+      groups, [&agents](const auto& group) { return std::ranges::includes(group.second, agents); });
 }
 
 // The time of the first fusion of all agents after which none has left the group. A map may leave
@@ -65,7 +66,8 @@ Values FusedBy(const ordered_json& report) {
       since = Number(change.at("session_s"));
     }
   }
-  const bool together = !report.at("groups").empty() && Agents(report.at("groups").front()) == all;
+  const bool together = !report.at("groups").empty() &&
+                        std::ranges::includes(Agents(report.at("groups").front()), all);
   return {{"", together ? since : std::nullopt}};
 }
 

@@ -69,6 +69,16 @@ TEST(Expectations, FusedIsForGood) {
   EXPECT_FALSE(Met("fused_by", 1000, apart));
 }
 
+// A session that continues a journal is fused with the maps of agents that it does not have.
+TEST(Expectations, AgentsOfEarlierSessionsMayBeInTheGroup) {
+  ordered_json report = Report();
+  report["groups"] = {{{"agents", {1, 2, 7}}}};
+  report["fused_at"].back()["map_ids"].push_back("7/1");
+  EXPECT_TRUE(Met("fused_by", 30.5, report));
+  report["groups"] = {{{"agents", {1, 7}}}, {{"agents", {2}}}};
+  EXPECT_FALSE(Met("fused_by", 1000, report));
+}
+
 // The report has one change for a split, of either part.
 TEST(Expectations, AMapMayLeaveWhileItsAgentStays) {
   for (const char* left : {R"({"agents": [2], "map_ids": ["2/20"]})",
