@@ -8,7 +8,7 @@ namespace pangea {
 // and the cause.
 void MakeFolder(const std::filesystem::path& path);
 
-// The folder's path without a trailing slash, such as a shell's completion adds.
+// The folder's path without a trailing slash, such as a shell's completion adds, or a trailing dot.
 std::filesystem::path WithoutSlash(const std::filesystem::path& folder);
 
 }  // namespace pangea

@@ -15,6 +15,7 @@
 #include "bus/bus.h"
 #include "bus/bus_url.h"
 #include "files/disk_io.h"
+#include "files/make_folder.h"
 #include "files/text_file.h"
 #include "link/wire.h"
 #include "options/yaml_options.h"
@@ -126,7 +127,7 @@ int ReadPid(int fd) {
 }  // namespace
 
 std::string NameOfFolder(const fs::path& folder) {
-  return fs::absolute(folder / "").parent_path().filename();
+  return WithoutSlash(fs::absolute(folder)).filename();
 }
 
 SiteDescription NewDescription(const std::string& name) {
@@ -176,7 +177,7 @@ Site OpenSite(const fs::path& folder) {
 }
 
 SiteInTheMaking::SiteInTheMaking(const fs::path& folder)
-    : target_(fs::absolute(folder / "").parent_path()),
+    : target_(WithoutSlash(fs::absolute(folder))),
       staging_(fmt::format("{}.new-{}", target_.string(), getpid())) {
   if (fs::exists(target_) && !(fs::is_directory(target_) && fs::is_empty(target_))) {
     throw std::runtime_error(

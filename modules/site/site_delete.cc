@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "files/disk_io.h"
+#include "files/make_folder.h"
 
 namespace pangea::site {
 
@@ -24,7 +25,7 @@ fs::path NameFor(const fs::path& folder) {
 
 fs::path Delete(const Site& site, bool now) {
   const SiteLock lock(site);
-  const fs::path folder = fs::absolute(site.folder / "").parent_path();
+  const fs::path folder = WithoutSlash(fs::absolute(site.folder));
   fs::path away = NameFor(folder);
   fs::rename(folder, away);
   SyncToDisk(folder.parent_path());

@@ -36,6 +36,19 @@ TEST(Site, IsMadeAtTheFirstOpeningAndFoundAtTheSecond) {
   EXPECT_EQ(OpenSite(folder / "").description.name, "hall");
 }
 
+// `cd hall; pangea-site create .`
+TEST(Site, IsTheFolderOneIsIn) {
+  const fs::path folder = FreshFolder("dot"), hall = folder / "hall";
+  fs::create_directories(hall);
+  EXPECT_EQ(OpenSite(hall / ".").description.name, "hall");
+  EXPECT_EQ(Delete(ReadSite(hall / "."), false).filename().string().rfind("hall.deleted-", 0), 0u);
+  EXPECT_FALSE(fs::exists(hall));
+  fs::create_directories(hall);
+  SiteInTheMaking made(hall / ".");
+  made.Commit(NewDescription("hall"));
+  EXPECT_EQ(ReadSite(hall).description.name, "hall");
+}
+
 TEST(Site, IsMadeOfAJournalThatWasThere) {
   const fs::path folder = FreshFolder("adopted");
   std::ofstream(folder / "journal.lcm") << "";
