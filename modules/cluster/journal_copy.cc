@@ -72,8 +72,8 @@ void JournalCopy::Append(const SiteStreams::JournalEvent& event) {
 
 bool JournalCopy::Follow() {
   const uint64_t end = streams_.JournalEnd().value_or(0);
-  int taken = 0;
-  for (; taken < kPiece && at_.sequence < end; ++taken) {
+  bool at_mark = false;
+  for (int taken = 0; taken < kPiece && at_.sequence < end && !at_mark; ++taken) {
     const auto event = streams_.EventAt(at_.sequence + 1);
     if (!event) {
       break;
@@ -89,9 +89,13 @@ bool JournalCopy::Follow() {
     }
     ++at_.sequence;
     at_.term = event->term;
+    at_mark = event->term > 0 && cursor().file.num_bytes > 0;
   }
   if (journal_ && !journal_->Sync()) {
     throw std::runtime_error(fmt::format("{}: the disk refuses writes", path_.string()));
+  }
+  if (at_mark) {
+    cursor().Write(path_);
   }
   return at_.sequence < end;
 }

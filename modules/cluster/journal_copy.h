@@ -27,8 +27,8 @@ class JournalCopy {
   JournalCopy(const JournalCopy&) = delete;
   JournalCopy& operator=(const JournalCopy&) = delete;
 
-  // Copies some new events of the stream; they are on the disk when this returns. Returns whether
-  // there may be more.
+  // Copies some new events of the stream; they are on the disk when this returns, and a mark that
+  // was passed is remembered (journal_shipper.h). Returns whether there may be more.
   bool Follow();
   // Up to where the file and the stream are equal.
   JournalCursor cursor() const;

@@ -81,7 +81,8 @@ void JournalShipper::OnJournalFile(const JournalFile& file) {
   if (shipped_.path != file.path) {
     const JournalCursor cursor = JournalCursor::Read(file.path, streams_);
     shipped_ = {file.path, cursor.file};
-    sequence_ = cursor.sequence;
+    sequence_ = written_ = cursor.sequence;
+    mark_ = cursor;
   }
   if (file.state.num_bytes < shipped_.state.num_bytes) {
     throw std::runtime_error(fmt::format("{} has become shorter", file.path));
@@ -102,6 +103,7 @@ bool JournalShipper::FindNext(std::optional<SiteStreams::JournalEvent>* event) {
     if ((*event)->term == 0) {
       return true;
     }
+    mark_ = {shipped_.state, sequence_ + 1, (*event)->term};
   }
   event->reset();
   return true;
@@ -156,6 +158,29 @@ void JournalShipper::Ship() {
   if (shipped_.path.empty()) {
     return;  // the file is not known yet
   }
+  ShipEvents();
+  Mark();
+}
+
+void JournalShipper::Mark() {
+  if (sequence_ >= begin_ && sequence_ - mark_.sequence >= kEventsPerMark) {
+    const auto answer = streams_.StoreTerm(term_, sequence_);
+    if (answer.stored == SiteStreams::Stored::kNew) {
+      sequence_ = end_ = answer.sequence;
+      mark_ = {shipped_.state, sequence_, term_};
+    }
+  }
+  if (mark_.sequence == written_) {
+    return;
+  }
+  try {
+    mark_.Write(shipped_.path);
+    written_ = mark_.sequence;
+  } catch (const std::runtime_error&) {  // a full disk: the next start takes longer
+  }
+}
+
+void JournalShipper::ShipEvents() {
   JournalState& at = shipped_.state;
   if (at.num_bytes >= wanted_bytes_) {
     return PassTerms();

@@ -6,6 +6,9 @@
 // it believes to have the lease. So the stream has one writer at a time, and is the site's true
 // journal. The file is a copy of it, which may be ahead by events that were not acknowledged.
 //
+// The core stores its term again after every kEventsPerMark events, as a mark: each host remembers
+// the newest one (JournalCursor), and its next start compares only what comes behind it.
+//
 // Events that belong to the file itself (CHECKSUMS, DAMAGED) are not stored. Not thread safe.
 
 #include <cstdint>
@@ -46,6 +49,8 @@ bool IsOfFile(const LogPiece& piece);
 
 class JournalShipper {
  public:
+  static constexpr uint64_t kEventsPerMark = 1000;
+
   // `term` is stored in the stream, with the sequence `begin`.
   JournalShipper(SiteStreams& streams, uint64_t term, uint64_t begin)
       : streams_(streams), term_(term), begin_(begin) {}
@@ -67,12 +72,15 @@ class JournalShipper {
  private:
   static constexpr int64_t kPieceBytes = 1'000'000;
 
+  void ShipEvents();
   void PassTerms();
   // Returns whether the event is in the stream now.
   bool ShipEvent(const LogPiece& event);
   // Finds the stream's next event and skips terms; no event: the end of the stream. False if NATS
   // does not answer.
   bool FindNext(std::optional<SiteStreams::JournalEvent>* event);
+  // Stores a mark if it is time, and remembers the newest one.
+  void Mark();
 
   SiteStreams& streams_;
   const uint64_t term_;
@@ -81,6 +89,8 @@ class JournalShipper {
   int64_t wanted_bytes_ = 0;
   uint64_t sequence_ = 0;  // of the newest message that the file has too
   uint64_t end_ = 0;       // newest known sequence of the stream
+  JournalCursor mark_;     // at the newest term that the file has passed
+  uint64_t written_ = 0;   // sequence of the mark that was written to the disk
   int64_t num_too_large_ = 0;
 };
 

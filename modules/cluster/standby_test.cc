@@ -129,6 +129,26 @@ TEST_F(StandbyTest, ABridgeOnTheCopyGoesOnWhereTheFormerCoreEnded) {
   EXPECT_EQ(streams_->JournalEnd(), *end + 1);
 }
 
+// What was compared once need not be compared again: each event is a question to NATS.
+TEST_F(StandbyTest, AStartComparesOnlyTheNewestEvents) {
+  AddKeyframes(int{JournalShipper::kEventsPerMark} + 5);
+  ASSERT_TRUE(server_->all_replicated());
+  const auto newest = [this](const std::string& journal) {
+    return JournalCursor::Read(journal, *streams_).sequence;
+  };
+  const uint64_t mark = newest(server_->journal_path());
+  EXPECT_GE(mark, JournalShipper::kEventsPerMark);
+  JournalCopy copy(copy_, *streams_);
+  while (copy.Follow()) {
+  }
+  EXPECT_EQ(newest(copy_), mark);
+  EXPECT_EQ(EventsOf(copy_), EventsOf(server_->journal_path()));
+  server_->RestartBridge();
+  AddKeyframes(2);
+  EXPECT_TRUE(server_->all_replicated());
+  EXPECT_EQ(EventsOf(server_->journal_path()).size(), JournalShipper::kEventsPerMark + 7);
+}
+
 // Fencing: its lease was taken while it slept, and it does not know.
 TEST_F(StandbyTest, AFormerCoreStoresNothingMore) {
   AddKeyframes(3);
