@@ -51,8 +51,8 @@ void JournalCopy::Cut() {
   const int64_t begin = at_.file.num_bytes;
   if (begin == 0) {
     throw std::runtime_error(fmt::format(
-        "{}: is another site's journal than the one in NATS: give this site another name, or move "
-        "the file away",
+        "{}: begins otherwise than the site's journal in NATS. If it is another site's, give this "
+        "site another name; if it was compacted, move it away: NATS has all of it",
         path_.string()));
   }
   cut_ = KeepDamaged(path_.string(), fd_, {{begin, scan_->file_bytes()}});

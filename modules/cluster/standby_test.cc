@@ -212,7 +212,7 @@ TEST_F(StandbyTest, AnotherSitesJournalIsRefused) {
     copy.Follow();
     FAIL() << "it took it";
   } catch (const std::runtime_error& error) {
-    EXPECT_THAT(error.what(), HasSubstr("is another site's journal"));
+    EXPECT_THAT(error.what(), HasSubstr("if it was compacted, move it away"));
   }
   EXPECT_THAT(EventsOf(copy_), SizeIs(1)) << "it stays as it is";
 }
