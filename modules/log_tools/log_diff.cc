@@ -42,7 +42,7 @@ Channels ReadChannels(const std::string& log, double until_s, LogReadings* readi
 }
 
 // Each run has its own revisions: from the clock in a live run, from 1 in a replay.
-bool IsRevision(const std::string& path) { return path == "revision"; }
+bool IsRevision(const std::string& path) { return path == "revision" || path == "group_revision"; }
 
 // Empty if they are equal.
 std::string HowTheyDiffer(const Message& a, const Message& b) {

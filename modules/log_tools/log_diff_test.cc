@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "messages/encoding.h"
+#include "pangea/anchor_t.hpp"
 #include "pangea/correction_t.hpp"
 #include "pangea/status_t.hpp"
 
@@ -64,6 +65,21 @@ TEST_F(LogDiffTest, RevisionsAreNotCompared) {
   const std::string live = Log("live", {1, 2, 3}, 1'795'000'000'000'000);
   EXPECT_EQ(DiffLogs(live, Log("replay", {1, 2, 3})).First(), nullptr);
   EXPECT_EQ(DiffLogs(live, Log("other", {1, 2, 4})).First()->first, 2);
+}
+
+// An anchor's pose names the revision of the group's state that it is from.
+TEST_F(LogDiffTest, NorAreThoseOfAnAnchorsGroup) {
+  const auto log_with_anchor = [this](const std::string& name, int64_t group_revision) {
+    std::string path = Log(name, {});
+    LogFileWriter file(path);
+    anchor_t anchor{};
+    anchor.group_revision = group_revision;
+    file.Write(1, "ANCHOR", EncodeMessage(anchor));
+    return path;
+  };
+  EXPECT_EQ(DiffLogs(log_with_anchor("live", 1'795'000'000'000'000), log_with_anchor("replay", 3))
+                .First(),
+            nullptr);
 }
 
 TEST_F(LogDiffTest, OneThatEndsFirst) {
