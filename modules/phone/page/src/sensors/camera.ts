@@ -2,7 +2,7 @@
 
 import type { CameraKind } from "./calibration";
 import { ArrivalClock, utimeOf } from "./clock";
-import { lumaOfFrame } from "./luma";
+import { imageOfFrame } from "./luma";
 import type { Luma } from "./luma";
 
 export interface CameraImage extends Luma {
@@ -117,9 +117,8 @@ export class Camera {
 
   // The frame is returned to the camera at once, because the camera has only few frames and stops when all are kept.
   private async giveFrame(utime: number, frame: VideoFrame) {
-    const taken = Promise.all([lumaOfFrame(frame), createImageBitmap(frame)]);
-    const [luma, picture] = await taken.finally(() => frame.close());
-    if (this.onImage && !this.stopped) this.onImage({ utime, picture, ...luma });
-    else picture.close();
+    const image = await imageOfFrame(frame).finally(() => frame.close());
+    if (this.onImage && !this.stopped) this.onImage({ utime, ...image });
+    else image.picture.close();
   }
 }

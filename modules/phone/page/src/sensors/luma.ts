@@ -9,8 +9,25 @@ export interface Luma {
 
 const kPlanar = ["I420", "I420A", "NV12", "I422", "I444"]; // the first plane is the luma
 
+// Whether the frame is displayed rotated or flipped, as those of a phone's camera that is built in sideways. TypeScript's library lacks
+// both attributes. A browser that lacks them too shows it by the sizes.
+function isRotated(frame: VideoFrame & { rotation?: number; flip?: boolean }): boolean {
+  const { rotation, flip, visibleRect, displayWidth, displayHeight } = frame;
+  return Boolean(rotation) || Boolean(flip) || visibleRect?.width !== displayWidth || visibleRect?.height !== displayHeight;
+}
+
+// The frame as it is displayed. Only drawing rotates it: copyTo and (in Chromium) createImageBitmap leave its pixels as they lie.
+export async function imageOfFrame(frame: VideoFrame): Promise<Luma & { picture: ImageBitmap }> {
+  if (isRotated(frame)) {
+    const context = drawn(frame, frame.displayWidth, frame.displayHeight);
+    return { ...lumaOfDrawn(context), picture: context.canvas.transferToImageBitmap() };
+  }
+  const [luma, picture] = await Promise.all([lumaOfFrame(frame), createImageBitmap(frame)]);
+  return { ...luma, picture };
+}
+
 // Needs no canvas if the frame has a luma plane.
-export async function lumaOfFrame(frame: VideoFrame): Promise<Luma> {
+async function lumaOfFrame(frame: VideoFrame): Promise<Luma> {
   if (!frame.format || !kPlanar.includes(frame.format)) return lumaOfPicture(frame, frame.displayWidth, frame.displayHeight);
   const { width, height } = frame.visibleRect!;
   const bytes = new Uint8Array(frame.allocationSize());
@@ -18,9 +35,16 @@ export async function lumaOfFrame(frame: VideoFrame): Promise<Luma> {
   return { luma: bytes.subarray(offset, offset + stride * height), width, height, stride };
 }
 
-export function lumaOfPicture(picture: CanvasImageSource, width: number, height: number): Luma {
+export const lumaOfPicture = (picture: CanvasImageSource, width: number, height: number) => lumaOfDrawn(drawn(picture, width, height));
+
+function drawn(picture: CanvasImageSource, width: number, height: number): OffscreenCanvasRenderingContext2D {
   const context = new OffscreenCanvas(width, height).getContext("2d", { willReadFrequently: true })!;
   context.drawImage(picture, 0, 0, width, height);
+  return context;
+}
+
+function lumaOfDrawn(context: OffscreenCanvasRenderingContext2D): Luma {
+  const { width, height } = context.canvas;
   return { luma: lumaOfRgba(context.getImageData(0, 0, width, height).data), width, height, stride: width };
 }
 
