@@ -6,8 +6,17 @@ import { uploadRecording } from "../link/upload";
 import type { Membership } from "../messages";
 import { download } from "./recorder";
 
+let saved = Promise.resolve(); // when the recordings before are saved
+
+// One after the other, because there is one dialog, and the server takes one recording at a time of an agent.
+export function saveRecording(...recording: Parameters<typeof save>): Promise<void> {
+  const saving = saved.then(() => save(...recording));
+  saved = saving.catch(() => {});
+  return saving;
+}
+
 // Asks a member where to save it. If the server does not take it, the dialog opens once more, so the recording is not lost.
-export async function saveRecording(zip: Blob, name: string, membership: Membership | undefined, notice: (text: string) => void) {
+async function save(zip: Blob, name: string, membership: Membership | undefined, notice: (text: string) => void) {
   byId("save_text").textContent = `A recording of ${(zip.size / 1e6).toFixed(1)} MB, with camera images.`;
   while (membership && (await askDialog("save_dialog")) === "server") {
     try {
