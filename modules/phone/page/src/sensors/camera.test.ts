@@ -45,3 +45,9 @@ test("each image of the camera is closed, those that come after its end too", as
   await new Promise((resolve) => setTimeout(resolve, 50));
   assert.deepEqual(frames.map(({ closed }) => closed), [1, 1, 1, 1, 1, 1]);
 });
+
+test("a page that the browser does not trust is told why there is no camera", async () => {
+  installBrowser(async () => {});
+  Object.defineProperty(globalThis, "navigator", { value: {}, configurable: true });
+  await assert.rejects(Camera.open(), /gives this page no camera.*certificate/);
+});

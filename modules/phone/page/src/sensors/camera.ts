@@ -34,6 +34,9 @@ export class Camera {
 
   // Throws the browser's error: no camera, no permission.
   static async open(): Promise<Camera> {
+    if (!navigator.mediaDevices) {
+      throw new Error("The browser gives this page no camera: trust its certificate, or open it in Chrome or Safari.");
+    }
     const stream = await navigator.mediaDevices.getUserMedia({
       audio: false,
       video: { facingMode: "environment", width: { ideal: 640 }, height: { ideal: 480 }, frameRate: { ideal: 30 } },
