@@ -28,10 +28,13 @@ export const keepMembership = (membership: Membership) => store(kStorageKey, JSO
 
 // Throws an error with the server's text for the visitor.
 export async function join(code: string, name: string): Promise<Membership> {
-  const answer = await fetch("/v1/join", {
+  const request = fetch("/v1/join", {
     method: "POST",
     headers: { "Content-Type": "application/json" },
     body: JSON.stringify({ code, name }),
+  });
+  const answer = await request.catch(() => {
+    throw new Error("The server cannot be reached: is this device in its network?");
   });
   const said = await answer.json().catch(() => ({}));
   if (!answer.ok) throw new Error(said.error ?? `The server does not answer (${answer.status}).`);

@@ -2,7 +2,7 @@ import assert from "node:assert/strict";
 import { createHmac } from "node:crypto";
 import { mock, test } from "node:test";
 import { GatewayLink, proofOf } from "./gateway_link";
-import { codeIn, parseMembership } from "./join";
+import { codeIn, join, parseMembership } from "./join";
 
 test("the proof is what the gateway computes", async () => {
   const nonce = new Uint8Array(32).map((_, i) => 7 * i);
@@ -23,6 +23,14 @@ test("storage that somebody else wrote is no membership", () => {
   for (const bad of [undefined, "", "no json", "null", JSON.stringify({ ...good, agent: 0 }), JSON.stringify({ ...good, key: "ab" })]) {
     assert.equal(parseMembership(bad), undefined);
   }
+});
+
+test("a server that cannot be reached is named, and not the browser's words", async () => {
+  const { fetch } = globalThis;
+  globalThis.fetch = async () => {
+    throw new TypeError("Failed to fetch");
+  };
+  await assert.rejects(join("ABCD-EFGH", "Anna"), /server cannot be reached/).finally(() => (globalThis.fetch = fetch));
 });
 
 // A fake WebSocket; the test plays the server.
