@@ -110,6 +110,7 @@ async function testBroken(browser, url, zip) {
 }
 
 async function testAnchor(page) {
+  await testQuietHint(page);
   await becomes(page, "somebody else's anchor is named", () =>
     [...document.querySelectorAll("#labels span")].some(({ textContent }) => /^kettle · 3\.\d m$/.test(textContent)));
   await becomes(page, "the hint says who", () => document.getElementById("hint").textContent.startsWith("In one map with Ben and Anna"));
@@ -131,6 +132,20 @@ async function testAnchor(page) {
   // 360 x 720 shows the middle of 640 x 480, 1.5 times as large.
   const [u, v] = [(90 + 300) / 1.5 - 0.5, 300 / 1.5 - 0.5];
   check("at the pixel that was tapped", edit.name === "tap" && Math.hypot(edit.pixel[0] - u, edit.pixel[1] - v) < 0.1, String(edit.pixel));
+}
+
+// A screen reader reads the hint when it is set, so it must be set only when it changes.
+async function testQuietHint(page) {
+  const numSet = await page.evaluate(async () => {
+    const hint = document.getElementById("hint");
+    const texts = [];
+    const observer = new MutationObserver(() => texts.push(hint.textContent));
+    observer.observe(hint, { childList: true, characterData: true, subtree: true });
+    await new Promise((done) => setTimeout(done, 2000));
+    observer.disconnect();
+    return texts.filter((text, i) => text === texts[i - 1]).length;
+  });
+  check("a hint that stays is set once", numSet === 0, numSet);
 }
 
 // The other agent's camera is at (1, 4, 1.5) in odom, and this agent walks along x.

@@ -87,8 +87,9 @@ export class Panels {
     ].filter(Boolean).join(" · ");
   }
 
+  // Screen readers read a text again whenever it is set.
   private showHint({ text, tone }: Hint) {
-    byId("hint").textContent = text;
+    if (byId("hint").textContent !== text) byId("hint").textContent = text;
     byId("hint").className = tone;
   }
 
