@@ -91,8 +91,8 @@ export class Visit {
 
   // The tab was hidden or is visible again.
   onVisibility(isHidden: boolean) {
-    if (!this.walk || !this.isLive) return;
-    if (isHidden) this.walk.endMap();
+    if (!this.isLive) return;
+    if (isHidden) this.walk?.endMap();
     else this.wakeLock.keep();
   }
 

@@ -192,9 +192,20 @@ function watchCameras({ asSafari }) {
     return stream;
   };
   window.numCameras = () => window.streams.filter(({ active }) => active).length;
-  window.numAwake = 0;
-  const request = async () => (++window.numAwake, { release: async () => void --window.numAwake });
+  const locks = new Set();
+  window.numAwake = () => locks.size;
+  const request = async () => {
+    const lock = { release: async () => void locks.delete(lock) };
+    locks.add(lock);
+    return lock;
+  };
   Object.defineProperty(navigator, "wakeLock", { value: { request } });
+  // A hidden page loses its lock.
+  window.hide = (hidden) => {
+    if (hidden) locks.clear();
+    Object.defineProperty(document, "hidden", { value: hidden, configurable: true });
+    document.dispatchEvent(new Event("visibilitychange"));
+  };
   window.rotate = () => screen.orientation.dispatchEvent(new Event("change"));
 }
 
@@ -210,10 +221,13 @@ async function testInterruptions(browser, url) {
   const page = await openPage(browser, url, kPhone, (page) => page.addInitScript(watchCameras, {}));
   await senseMotion(page);
   await page.locator("#start").click();
-  await hasOneNewAgent(page, "an agent to be interrupted starts");
+  await becomes(page, "a calibration to be interrupted starts", () => Boolean(pangea.calibration));
+  await page.evaluate(() => (hide(true), hide(false)));
+  await hasOneNewAgent(page, "then an agent to be interrupted");
+  check("the screen is kept on, also if the page was hidden meanwhile", (await page.evaluate(() => numAwake())) === 1);
   await recordsUntil(page, "a rotated screen", () => page.evaluate(() => rotate()));
   await hasOneNewAgent(page, "and starts anew");
-  check("the screen is kept on, once", (await page.evaluate(() => numAwake)) === 1);
+  check("the screen is kept on, once", (await page.evaluate(() => numAwake())) === 1);
   await recordsUntil(page, "a failure", () => page.evaluate(() => pangea.walk.removeAnchor("breaks")));
   await becomes(page, "and leads back", () => document.getElementById("welcome").checkVisibility());
   await page.locator("#start").click();
@@ -237,7 +251,7 @@ async function testInterruptions(browser, url) {
   await page.waitForTimeout(1000);
   check("and stays there, without camera and agent", page.workers().length === 0 &&
     (await page.evaluate(() => numCameras() === 0 && document.getElementById("welcome").checkVisibility())));
-  check("and the screen may go off", (await page.evaluate(() => numAwake)) === 0);
+  check("and the screen may go off", (await page.evaluate(() => numAwake())) === 0);
   await testDamagedCalibration(page);
   await page.close();
 }
