@@ -96,7 +96,7 @@ export class Visit {
     else this.wakeLock.keep();
   }
 
-  // Stores a sensor.yaml of this phone's camera, as pangea-calibrate writes it.
+  // Stores a sensor.yaml of this phone's camera, as pangea-calibrate writes it. A calibration that runs ends with it.
   keepCalibration(yaml: string) {
     const { camera } = this;
     if (!camera) throw new Error("Start once, so that the camera is known; then drop its sensor.yaml again.");
@@ -105,6 +105,7 @@ export class Visit {
       throw new Error(`sensor.yaml: field 'resolution' is ${width} x ${height}, the camera gives ${camera.width} x ${camera.height}`);
     }
     if (!storeCalibration(camera, yaml)) throw new Error(kNotKept);
+    if (this.isLive) this.endCalibration(yaml);
   }
 
   // A start that fails leads back, unless it was overtaken: then nobody waits for it, and the newer walk goes on.

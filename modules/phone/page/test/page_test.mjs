@@ -74,6 +74,31 @@ async function testKeptCalibration(page) {
   await becomes(page, "or be skipped", () => pangea.walk?.vio?.counters.images > 2);
   check("for a rough one", /rough, of no particular phone/.test((await told(page)).cameraYaml));
   await page.locator("#stop").click();
+  await testDroppedCalibration(page);
+}
+
+// A sensor.yaml that is dropped while the camera is calibrated is used at once.
+async function testDroppedCalibration(page) {
+  await page.evaluate(() => (pangea.walk.isOld = true));
+  await page.locator("#start").click();
+  await becomes(page, "a calibration to be replaced starts", () => Boolean(pangea.calibration));
+  await page.evaluate(() => {
+    const yaml = `comment: dropped
+T_BS: {cols: 4, rows: 4, data: [1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1]}
+resolution: [640, 480]
+intrinsics: [500, 500, 320, 240]
+distortion_model: radial-tangential
+distortion_coefficients: [0, 0, 0, 0]
+`;
+    const entry = { isFile: true, fullPath: "/sensor.yaml", file: (done) => done(new File([yaml], "sensor.yaml")) };
+    const event = Object.assign(new Event("drop"), { dataTransfer: { items: [{ webkitGetAsEntry: () => entry }] } });
+    dispatchEvent(event);
+    window.droppedAt = performance.now();
+  });
+  await becomes(page, "by one that is dropped", () => !pangea.walk?.isOld && pangea.walk?.vio?.counters.images > 2);
+  check("which is used", /^comment: dropped/.test((await told(page)).cameraYaml));
+  await page.locator("#stop").click();
+  await page.locator("#recalibrate").click();
 }
 
 // Plays the recording that was made, after changing its files.
