@@ -370,6 +370,23 @@ async function testPlaying(browser, url, zip) {
   await page.close();
 }
 
+// A member scans the code of the invite again.
+async function testMembers(browser, url) {
+  const page = await openPage(browser, `${url}#join=ABCD-EFGH`, kPhone);
+  const key = "ab".repeat(32);
+  await page.evaluate((key) => localStorage.setItem("pangea.membership", JSON.stringify({ agent: 2, key, site: "hall", name: "Anna" })), key);
+  await page.reload();
+  await senseMotion(page);
+  await page.locator("#start").click();
+  await becomes(page, "a member who scans a used code again starts", () => Boolean(pangea.calibration));
+  check("and reads so", /^You go on as Anna/.test(await page.locator("#notice").textContent()), await page.locator("#notice").textContent());
+  await page.locator("#skip").click();
+  await becomes(page, "as the member", () => pangea.walk?.membership?.agent === 2);
+  await page.locator("#stop").click();
+  check("without the code", (await page.evaluate(() => location.hash)) === "" && !(await page.locator("#code").isVisible()));
+  await page.close();
+}
+
 async function testRefusals(browser, url) {
   const page = await openPage(browser, `${url}#join=ABCD-EFGH`);
   check("the code of the link is there", (await page.locator("#code").inputValue()) === "ABCD-EFGH");
@@ -386,6 +403,7 @@ await run(async () => {
   await testInterruptions(browser, url);
   await testJoining(browser, url);
   await testUpload(browser, url);
+  await testMembers(browser, url);
   await testPlaying(browser, url, zip);
   await testUncalibrated(browser, url, zip);
   await testBroken(browser, url, zip);
@@ -394,4 +412,4 @@ await run(async () => {
   await testXrBlind(browser, url);
   await testRefusals(browser, url);
   await browser.close();
-});
+}, /status of 403/);

@@ -26,6 +26,9 @@ export const forgetMembership = () => forget(kStorageKey);
 // False if the browser does not keep it.
 export const keepMembership = (membership: Membership) => store(kStorageKey, JSON.stringify(membership));
 
+// The server refused the code.
+export class CodeRefused extends Error {}
+
 // Throws an error with the server's text for the visitor.
 export async function join(code: string, name: string): Promise<Membership> {
   const request = fetch("/v1/join", {
@@ -37,6 +40,7 @@ export async function join(code: string, name: string): Promise<Membership> {
     throw new Error("The server cannot be reached: is this device in its network?");
   });
   const said = await answer.json().catch(() => ({}));
+  if (answer.status === 403) throw new CodeRefused(said.error ?? "The server refused the code.");
   if (!answer.ok) throw new Error(said.error ?? `The server does not answer (${answer.status}).`);
   const membership = parseMembership(JSON.stringify({ ...said, name }));
   if (!membership) throw new Error("The server's answer has no key in it.");

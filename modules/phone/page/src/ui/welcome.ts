@@ -1,11 +1,12 @@
 // The panel before a walk: who the visitor is, and joining.
 
 import { byId } from "../dom";
-import { codeIn, forgetMembership, join, keepMembership, storedMembership } from "../link/join";
+import { CodeRefused, codeIn, forgetMembership, join, keepMembership, storedMembership } from "../link/join";
 import type { Membership } from "../messages";
 import { forgetCalibrations, storedCalibrations } from "../sensors/calibration";
 import { notice } from "./notice";
 
+const nameOf = ({ name, agent }: Membership) => name || `agent ${agent}`;
 const codeField = () => byId<HTMLInputElement>("code");
 
 export class Welcome {
@@ -34,8 +35,14 @@ export class Welcome {
   private async joinByCode() {
     const code = codeField().value.trim();
     if (code === "") return;
-    this.membership = await join(code, byId<HTMLInputElement>("name").value.trim());
-    if (!keepMembership(this.membership)) notice("This browser does not keep your key: it is lost when you close the page.");
+    try {
+      this.membership = await join(code, byId<HTMLInputElement>("name").value.trim());
+      if (!keepMembership(this.membership)) notice("This browser does not keep your key: it is lost when you close the page.");
+    } catch (error) {
+      // A member who scans the code of the invite once more.
+      if (!(error instanceof CodeRefused) || !this.membership) throw error;
+      notice(`You go on as ${nameOf(this.membership)}: this code is not valid any more.`);
+    }
     // A reloaded page must not offer the code again.
     history.replaceState(null, "", location.pathname);
     codeField().value = "";
@@ -49,7 +56,7 @@ export class Welcome {
     byId("forget").hidden = !this.membership;
     byId("recalibrate").hidden = storedCalibrations() === 0;
     byId("invitation").textContent = member
-      ? `You are ${member.name || `agent ${member.agent}`}${member.site ? ` at ${member.site}` : ""}.`
+      ? `You are ${nameOf(member)}${member.site ? ` at ${member.site}` : ""}.`
       : code ? "You are invited." : "With an invite code you join others. Without one, the phone tracks by itself.";
     byId("welcome").hidden = false;
   }
