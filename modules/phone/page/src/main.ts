@@ -108,6 +108,8 @@ async function openDrop(items: DataTransferItemList) {
 
 // --- the tab and the screen
 
+// A link with a code or an option that is opened in this tab: the browser does not load the page again.
+addEventListener("hashchange", () => panels.shown || location.reload());
 document.addEventListener("visibilitychange", () => {
   if (panels.shown) visit.onVisibility(document.hidden);
 });

@@ -384,6 +384,9 @@ async function testMembers(browser, url) {
   await becomes(page, "as the member", () => pangea.walk?.membership?.agent === 2);
   await page.locator("#stop").click();
   check("without the code", (await page.evaluate(() => location.hash)) === "" && !(await page.locator("#code").isVisible()));
+
+  await page.evaluate(() => (location.hash = "join=JKMN-PQRS"));
+  await becomes(page, "a link that is followed in the same tab is read", () => document.getElementById("code").value === "JKMN-PQRS");
   await page.close();
 }
 
