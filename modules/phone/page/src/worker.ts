@@ -2,7 +2,7 @@
 
 import { PhoneAgent } from "./agent/phone_agent";
 import type { PhoneEvents, NewAnchor, WasmModuleFactory } from "./agent/phone_agent";
-import { SpoolStore } from "./agent/spool_store";
+import { SpoolStore, spoolOf } from "./agent/spool_store";
 import { GatewayLink, gatewayOrigin } from "./link/gateway_link";
 import { kImuStride } from "./messages";
 import type { FromWorker, OpenAgent, ToWorker } from "./messages";
@@ -46,7 +46,7 @@ class AgentHost {
 
   private async connect(agent: number, key: string) {
     try {
-      this.spool = await SpoolStore.open(`pangea.spool.${agent}`);
+      this.spool = await SpoolStore.open(spoolOf(agent));
       this.agent.restoreSpool(await this.spool.entries());
     } catch (error) {
       storageFailed(error);

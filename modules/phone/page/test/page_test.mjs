@@ -370,7 +370,7 @@ async function testPlaying(browser, url, zip) {
   await page.close();
 }
 
-// A member scans the code of the invite again.
+// A member scans the code of the invite again, and a phone gets the agent's id of another site's.
 async function testMembers(browser, url) {
   const page = await openPage(browser, `${url}#join=ABCD-EFGH`, kPhone);
   const key = "ab".repeat(32);
@@ -387,7 +387,30 @@ async function testMembers(browser, url) {
 
   await page.evaluate(() => (location.hash = "join=JKMN-PQRS"));
   await becomes(page, "a link that is followed in the same tab is read", () => document.getElementById("code").value === "JKMN-PQRS");
-  await page.close();
+  const spool = "pangea.spool.2";
+  await page.evaluate((name) => new Promise((done) => {
+    const open = indexedDB.open(name, 1);
+    open.onupgradeneeded = () => open.result.createObjectStore("keyframes", { keyPath: "id" });
+    open.onsuccess = () => {
+      const writing = open.result.transaction("keyframes", "readwrite");
+      writing.objectStore("keyframes").put({ id: "2/1#0", order: 0, bytes: new Uint8Array(1) });
+      writing.oncomplete = () => (open.result.close(), done());
+    };
+  }), spool);
+  await page.route("**/v1/join", (route) => route.fulfill({ json: { agent: 2, key, site: "yard" } }));
+  await page.locator("#start").click();
+  await becomes(page, "whoever joins is calibrated", () => Boolean(pangea.calibration));
+  const left = await page.evaluate((name) => new Promise((done) => {
+    const open = indexedDB.open(name);
+    open.onsuccess = () => {
+      const { result } = open;
+      if (result.objectStoreNames.length === 0) return result.close(), done(0);
+      const count = result.transaction("keyframes").objectStore("keyframes").count();
+      count.onsuccess = () => (result.close(), done(count.result));
+    };
+  }), spool);
+  check("and does not send the keyframes of an earlier agent", left === 0, left);
+  await stopAndClose(page);
 }
 
 async function testRefusals(browser, url) {

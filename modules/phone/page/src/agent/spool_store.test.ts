@@ -1,7 +1,7 @@
 import "fake-indexeddb/auto";
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { SpoolStore } from "./spool_store";
+import { SpoolStore, spoolOf } from "./spool_store";
 
 const put = (id: string, byte: number) => ({ op: "put" as const, id, bytes: new Uint8Array([byte]) });
 const remove = (id: string) => ({ op: "delete" as const, id });
@@ -44,4 +44,14 @@ test("on a full disk nothing is put, but what the server has is deleted", async 
   assert.deepEqual(await ids(store), ["2"]);
   await store.apply([put("4", 4)]);
   assert.deepEqual(await ids(store), ["2", "4"]);
+});
+
+test("all are removed, also one that is open", async () => {
+  const [one, other] = [await SpoolStore.open(spoolOf(7)), await SpoolStore.open(spoolOf(8))];
+  await one.apply([put("1", 1)]);
+  await other.apply([put("2", 2)]);
+  other.close();
+  await SpoolStore.removeAll();
+  for (const agent of [7, 8]) assert.deepEqual(await ids(await SpoolStore.open(spoolOf(agent))), []);
+  await assert.rejects(one.apply([put("3", 3)]));
 });

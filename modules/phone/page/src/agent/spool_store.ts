@@ -3,6 +3,9 @@
 import type { SpoolChange } from "./phone_agent";
 
 const kStore = "keyframes";
+const kPrefix = "pangea.spool.";
+
+export const spoolOf = (agent: number) => `${kPrefix}${agent}`;
 
 const done = <T>(request: IDBRequest<T>) =>
   new Promise<T>((resolve, reject) => {
@@ -25,9 +28,17 @@ export class SpoolStore {
   static async open(name: string): Promise<SpoolStore> {
     const request = indexedDB.open(name, 1);
     request.onupgradeneeded = () => request.result.createObjectStore(kStore, { keyPath: "id" });
-    const store = new SpoolStore(await done(request), 0);
+    const database = await done(request);
+    database.onversionchange = () => database.close(); // it is being removed
+    const store = new SpoolStore(database, 0);
     store.nextOrder = ((await store.entries()).at(-1)?.order ?? -1) + 1;
     return store;
+  }
+
+  // Removes the spools of all agents. Changes of one that is open fail from then on.
+  static async removeAll() {
+    const names = (await indexedDB.databases()).map(({ name }) => name ?? "").filter((name) => name.startsWith(kPrefix));
+    await Promise.all(names.map((name) => done(indexedDB.deleteDatabase(name))));
   }
 
   // All entries, in the order in which they were put.

@@ -1,5 +1,6 @@
 // The panel before a walk: who the visitor is, and joining.
 
+import { SpoolStore } from "../agent/spool_store";
 import { byId } from "../dom";
 import { CodeRefused, codeIn, forgetMembership, join, keepMembership, storedMembership } from "../link/join";
 import type { Membership } from "../messages";
@@ -37,6 +38,8 @@ export class Welcome {
     if (code === "") return;
     try {
       this.membership = await join(code, byId<HTMLInputElement>("name").value.trim());
+      // The keyframes of an earlier agent cannot be sent without its key; another site may have given the same id.
+      await SpoolStore.removeAll().catch(() => {});
       if (!keepMembership(this.membership)) notice("This browser does not keep your key: it is lost when you close the page.");
     } catch (error) {
       // A member who scans the code of the invite once more.
