@@ -17,6 +17,7 @@ const model = new Model();
 const canvas = byId<HTMLCanvasElement>("stage");
 const stage = new Stage(canvas, byId("labels"), model);
 let panelsDirty = true;
+let speed = NaN; // of the player, as the server has last said; another page may have set it
 let dragging = false;
 
 let watched = 0; // the agent whose camera is shown
@@ -60,6 +61,7 @@ function drawPanels() {
     model.agents.size > 0 ? "" : start.live ? `Waiting for agents on ${start.source}` : "Nothing yet: play on";
   byId("player").hidden = start.live;
   byId("play").textContent = model.playing ? "❚❚" : "▶";
+  if (model.speed !== speed) byId<HTMLSelectElement>("speed").value = String((speed = model.speed));
   byId("time").textContent = `${clock(model.now_s)} / ${clock(start.end_s)}`;
   const slider = byId<HTMLInputElement>("slider");
   slider.max = String(start.end_s);

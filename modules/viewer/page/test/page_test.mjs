@@ -65,6 +65,7 @@ async function testLog(browser) {
     const other = await openPage(browser, url, context);
     await becomes(other, `a second browser (${name}) shows the same`, () =>
       document.querySelectorAll(".agent").length === 2 && pangea.model.numKeyframes === 63);
+    check("and the same speed", (await other.locator("#speed").inputValue()) === "20");
     await settled(other);
     await other.waitForTimeout(1500);
     await screenshot(other, name);
