@@ -104,8 +104,10 @@ export function drawAgents(model: Model) {
   });
 }
 
+export const isSilent = ({ heard_s }: ProcessSaid, now_s: number) => now_s - heard_s > kSilent_s;
+
 function healthOf(process: ProcessSaid, now_s: number): { mark: string; state: string } {
-  if (now_s - process.heard_s > kSilent_s) return { mark: "✕", state: "silent" };
+  if (isSilent(process, now_s)) return { mark: "✕", state: "silent" };
   if (process.dropped > 0) return { mark: "▲", state: "losses" };
   return process.pending > 0 ? { mark: "◐", state: "busy" } : { mark: "●", state: "idle" };
 }

@@ -2,14 +2,14 @@
 
 import { encode } from "uqr";
 import type { Model } from "./model";
-import { byId } from "./panels";
+import { byId, isSilent } from "./panels";
 
 // The beginning of STATUS_gateway's summary (modules/gateway/gateway_process.cc).
 const kAddress = /^(https:\S+\/) \(certificate's SHA-256 ([0-9A-F:]+)\)/;
 const kQuiet = 4; // modules around the code
 const kModule_px = 6;
 
-let shown = ""; // the address in the QR code
+let shown = ""; // the address and the fingerprint in the dialog
 
 function drawCode(text: string) {
   const { size, data } = encode(text, { border: kQuiet });
@@ -26,10 +26,12 @@ function drawCode(text: string) {
 
 // Shows the button while a gateway runs.
 export function drawPhones(model: Model) {
-  const [, url, fingerprint] = kAddress.exec(model.processes.get("gateway")?.summary ?? "") ?? [];
-  byId("phones").hidden = url === undefined;
-  if (url === undefined || url === shown) return;
-  shown = url;
+  const gateway = model.processes.get("gateway");
+  const runs = gateway !== undefined && !isSilent(gateway, model.now_s);
+  const [told, url, fingerprint] = (runs && kAddress.exec(gateway.summary)) || [];
+  byId("phones").hidden = told === undefined;
+  if (told === undefined || told === shown) return;
+  shown = told;
   drawCode(url);
   byId("phones_url").textContent = url;
   byId("phones_fingerprint").textContent = fingerprint;

@@ -195,7 +195,9 @@ async function testPhones(page, bus) {
   check("phones: without a gateway there is nothing to join", await page.locator("#phones").isHidden());
   const site = `${options.out}/site_of_phones`;
   rmSync(site, { recursive: true, force: true });
-  start(`${options.bin}/pangea-gateway`, "--site", site, "--bus", bus, "--link", bus.replace("76.67", "76.68"), "--listen", "127.0.0.1", "--port", "0");
+  const startGateway = (port) => start(`${options.bin}/pangea-gateway`,
+    "--site", site, "--bus", bus, "--link", bus.replace("76.67", "76.68"), "--listen", "127.0.0.1", "--port", port);
+  const gateway = startGateway("0");
   await becomes(page, "phones: a gateway has a button", () => !document.getElementById("phones").hidden);
   await page.locator("#phones").click();
   const { url, fingerprint } = JSON.parse(readFileSync(`${site}/gateway/address.json`, "utf8"));
@@ -208,6 +210,12 @@ async function testPhones(page, bus) {
   check("phones: with the certificate's fingerprint", (await page.locator("#phones_fingerprint").textContent()) === fingerprint);
   await screenshot(page, "phones");
   await page.keyboard.press("Escape");
+  gateway.kill();
+  await becomes(page, "phones: without the gateway the button goes", () => document.getElementById("phones").hidden, undefined, 20_000);
+  for (const file of ["ca.pem", "ca.key"]) rmSync(`${site}/gateway/${file}`);
+  startGateway(new URL(url).port);
+  await becomes(page, "phones: another authority at the same address has its fingerprint", (old) =>
+    !document.getElementById("phones").hidden && document.getElementById("phones_fingerprint").textContent !== old, fingerprint, 20_000);
 }
 
 // Pixels of map points that are not covered and are far from each other.
