@@ -46,11 +46,14 @@ function take(update: Update) {
   panelsDirty = true;
 }
 
+let hiding: ReturnType<typeof setTimeout> | undefined;
+
 function announce(text: string) {
   const notice = byId("notice");
   notice.textContent = text;
   notice.classList.add("shown");
-  setTimeout(() => notice.classList.remove("shown"), kNotice_ms);
+  clearTimeout(hiding);
+  hiding = setTimeout(() => notice.classList.remove("shown"), kNotice_ms);
 }
 
 function drawPanels() {

@@ -247,9 +247,29 @@ const anchorNow = () => {
 };
 const distance = (a, b) => Math.hypot(...a.map((value, i) => value - b[i]));
 
+// A notice stays for five seconds, also if another one was shown shortly before.
+async function testNotices(page) {
+  const isShown = () => page.evaluate(() => document.getElementById("notice").classList.contains("shown"));
+  await page.locator("#anchor_add").click();
+  await page.waitForTimeout(4000);
+  const empty = await page.evaluate(() => {
+    for (let y = 100; y < innerHeight; y += 20) {
+      for (let x = 300; x < innerWidth; x += 20) {
+        if (document.elementFromPoint(x, y)?.id === "stage" && !pangea.stage.picking.pick(x, y)) return { x, y };
+      }
+    }
+  });
+  await page.mouse.click(empty.x, empty.y);
+  await becomes(page, "anchors: where no point is the page says so", () => document.getElementById("notice").textContent === "No map point there");
+  await page.waitForTimeout(2000);
+  check("anchors: for as long as it says other things", await isShown());
+  await page.keyboard.press("Escape");
+}
+
 async function testLiveAnchors(page) {
   await settled(page);
   await page.waitForTimeout(1500); // the camera comes to a stop
+  await testNotices(page);
   const [point, ...others] = await page.evaluate(pointsToClick, 3);
   await placeAnchor(page, point, "kettle <b>");
   await becomes(page, "anchors: one that is placed is listed by its name", () =>
