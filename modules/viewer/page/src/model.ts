@@ -91,9 +91,8 @@ export class Model {
 
   apply(update: Update) {
     if (update.start) {
-      const before = this.before;
-      Object.assign(this, new Model());
-      this.before = before;
+      const { before, anchorsVersion } = this;
+      Object.assign(this, new Model(), { before, anchorsVersion: anchorsVersion + 1 });
       this.start = update.start;
     }
     this.now_s = update.now_s;

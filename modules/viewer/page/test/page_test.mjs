@@ -343,12 +343,35 @@ async function testAnchorsOfLog(page) {
   await page.mouse.move(5, 400);
   await page.waitForTimeout(300);
   await screenshot(page, "anchors_of_log");
+  await testOtherAnchors(page);
   await page.locator("#show_anchors").uncheck();
   await becomes(page, "anchors: they can be hidden", () =>
     [...document.querySelectorAll(".anchor_label")].every((label) => label.hidden));
   await seek(page, 0.2);
   await becomes(page, "anchors: before they were made there are none", () =>
     pangea.model.anchors.size === 0 && document.getElementById("anchors").hidden);
+}
+
+// Another time of the log may have as many anchors, with other names. The speed makes the server send something.
+async function testOtherAnchors(page) {
+  await page.evaluate(() => {
+    const { model } = pangea;
+    const none = { maps: [], agents: [], constraints: [], processes: [], fusions: [], keyframes: [], solved: [] };
+    const { start, now_s, playing, speed, leftOut: left_out } = model;
+    const jump = (suffix) => {
+      const anchors = [...model.anchors.values()].map(({ said }) => ({ ...said, name: said.name + suffix }));
+      model.apply({ ...none, start, now_s, playing, speed, left_out, anchors });
+    };
+    jump("");
+    Object.assign(window, { jump });
+  });
+  const names = () => page.evaluate(() => document.querySelector(".anchor .name").textContent);
+  await page.locator("#speed").selectOption("2");
+  await page.waitForTimeout(500);
+  await page.evaluate(() => window.jump(" of another time"));
+  await page.locator("#speed").selectOption("5");
+  await page.waitForTimeout(500);
+  check("anchors: the list follows a jump in time", /of another time$/.test(await names()), await names());
 }
 
 // All cards are completely visible without scrolling.
