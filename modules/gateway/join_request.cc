@@ -27,6 +27,15 @@ char PlainLetter(char c) {
   }
 }
 
+// Control characters also have two bytes in UTF-8: U+0080 to U+009F, which some terminals obey.
+bool HasControl(std::string_view text) {
+  const auto is_pair = [](unsigned char a, unsigned char b) {
+    return a == 0xc2 && b >= 0x80 && b <= 0x9f;
+  };
+  return std::ranges::any_of(text, [](unsigned char c) { return c < 0x20 || c == 0x7f; }) ||
+         std::ranges::adjacent_find(text, is_pair) != text.end();
+}
+
 }  // namespace
 
 std::string NewJoinCode() {
@@ -62,9 +71,7 @@ bool IsVisitorName(std::string_view text) {
       return false;
     }
   };
-  return text.size() <= kMaxVisitorName &&
-         std::ranges::none_of(text, [](unsigned char c) { return c < 0x20 || c == 0x7f; }) &&
-         is_utf8();
+  return text.size() <= kMaxVisitorName && !HasControl(text) && is_utf8();
 }
 
 std::variant<JoinRequest, std::string> ParseJoinRequest(std::string_view body) {

@@ -83,6 +83,17 @@ TEST(JoinRequest, ANameIsUtf8) {
               HasSubstr("no JSON object"));
 }
 
+// The name is printed on the terminal of whoever runs `pangea-gateway list`.
+TEST(JoinRequest, ANameHasNoControlCharacters) {
+  for (const std::string name : {"\x1b[2J", "\x7f",
+                                 "\xc2\x9b"
+                                 "2J",
+                                 "Anna\xc2\x80"}) {
+    EXPECT_FALSE(IsVisitorName(name)) << testing::PrintToString(name);
+  }
+  EXPECT_TRUE(IsVisitorName("Anna\xc2\xa0M\xc3\x9bller"));
+}
+
 TEST(AttemptLimit, SoManyAtOnceThenOneInAWhile) {
   AttemptLimit limit;
   int64_t now = 1'000'000;
