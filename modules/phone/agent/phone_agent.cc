@@ -180,6 +180,9 @@ std::optional<MapId> PhoneAgent::MapAt(int64_t utime) const {
 }
 
 AnchorId PhoneAgent::PlaceAnchor(const NewAnchor& anchor) {
+  if (!uplink_) {
+    throw std::runtime_error("only an agent that has joined a server can place anchors");
+  }
   const std::optional<MapId> map = MapAt(anchor.utime);
   if (!map) {
     throw std::runtime_error("the odometry did not track this image: an anchor has no place in it");

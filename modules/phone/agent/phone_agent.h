@@ -90,7 +90,8 @@ class PhoneAgent {
   // Gives back a keyframe that an earlier run stored. Call it before the first image, in the order
   // in which they were stored. A damaged keyframe is deleted (PhoneEvents::spool).
   void Restore(const std::string& id, Bytes bytes);
-  // Throws std::runtime_error if the odometry did not track that image or a field is out of bounds.
+  // Throws std::runtime_error if there is no key, the odometry did not track that image, or a field
+  // is out of bounds.
   AnchorId PlaceAnchor(const NewAnchor& anchor);
   // Does nothing if there is no such anchor.
   void RemoveAnchor(const AnchorId& id);

@@ -249,6 +249,19 @@ TEST(PhoneAgentWithDevicePoses, GivesPosesAndKeyframes) {
   EXPECT_EQ(add(Rigid3{}).pose->map, (MapId{7, kStart_us + 1}));
 }
 
+// Nobody would ever show it.
+TEST(PhoneAgentWithoutServer, PlacesNoAnchor) {
+  AgentTexts texts = Texts();
+  texts.device_poses = true;
+  texts.key_hex = "";
+  PhoneAgent agent(ReadAgentConfig(texts));
+  agent.AddImage(100'000, cv::Mat(48, 64, CV_8U, cv::Scalar(0)), Rigid3{});
+  agent.Poll(kStart_us);
+  ASSERT_EQ(agent.Take().pose->state, pose_t::STATE_TRACKING);
+  EXPECT_THROW(agent.PlaceAnchor({"kettle", "", 100'000, Eigen::Vector2d(9, 9), {}}),
+               std::runtime_error);
+}
+
 class PhoneAgentWithDevicePosesTest : public PhoneAgentTest {
  protected:
   PhoneAgentWithDevicePosesTest() : PhoneAgentTest(WithDevicePoses()) {}

@@ -215,7 +215,7 @@ export class PhoneAgent {
     }
   }
 
-  /** Returns the new anchor's id. Throws if the agent did not track that image or a field is out of bounds. */
+  /** Returns the new anchor's id. Throws if the agent has no key or did not track that image, or a field is out of bounds. */
   placeAnchor(edit: NewAnchor): string {
     const id = this.native.placeAnchor(edit);
     if (id.startsWith("error: ")) {
