@@ -95,8 +95,8 @@ void VioProcess::AddTracks(const TrackedFrame& frame, const cv::Mat& image,
 }
 
 void VioProcess::NoteSaturation(std::span<const ImuSample> imu) {
-  const auto found = std::ranges::count_if(
-      imu, [this](const ImuSample& sample) { return saturation_.Add(sample); });
+  const auto found = std::count_if(
+      imu.begin(), imu.end(), [this](const ImuSample& sample) { return saturation_.Add(sample); });
   saturated_ = found > 0;
   if (saturated_) {
     num_saturated_ += found;
