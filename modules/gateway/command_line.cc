@@ -157,7 +157,7 @@ void AddArguments(CLI::App& app, GatewayArguments* arguments) {
   app.add_option("--recordings-gb", arguments->recordings_gb,
                  "so much of the recordings that pages upload is kept; 0: none")
       ->capture_default_str()
-      ->check(CLI::Range(0.0, 1e6));
+      ->check(Within(0, 1e6));
   app.require_subcommand(0, 1);
   AddSubcommands(app);
 }

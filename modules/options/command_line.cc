@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <exception>
 #include <filesystem>
+#include <functional>
 #include <iostream>
 #include <stdexcept>
 #include <system_error>
@@ -13,7 +14,7 @@
 namespace pangea {
 namespace {
 
-CLI::Validator NumberThat(bool (*is_good)(double), const std::string& words) {
+CLI::Validator NumberThat(const std::function<bool(double)>& is_good, const std::string& words) {
   return {[=](std::string& text) -> std::string {
             double value = 0;
             const bool good =
@@ -71,6 +72,11 @@ CLI::Validator Positive() {
 
 CLI::Validator NotNegative() {
   return NumberThat([](double value) { return value >= 0; }, "0 or above");
+}
+
+CLI::Validator Within(double least, double most) {
+  return NumberThat([=](double value) { return value >= least && value <= most; },
+                    fmt::format("in [{:g} - {:g}]", least, most));
 }
 
 }  // namespace pangea

@@ -18,8 +18,10 @@ int RunSubcommand(CLI::App& app, int argc, char** argv);
 // Flushes stdout. False, with a line on stderr, if not all output could be written (a full disk).
 bool OutputIsWritten(const std::string& program);
 
-// For an option's check(): a finite number that is > 0, or >= 0. CLI11's own validators accept NaN.
+// For an option's check(): a finite number that is > 0, >= 0, or in this range. CLI11's own
+// validators accept NaN.
 CLI::Validator Positive();
 CLI::Validator NotNegative();
+CLI::Validator Within(double least, double most);
 
 }  // namespace pangea

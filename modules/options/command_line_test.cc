@@ -32,5 +32,19 @@ TEST(Failed, AFileOrFolderThatCannotBeUsedIsNamedFirst) {
             "pangea-fusion: a, b: cannot be used: No space left on device\n");
 }
 
+TEST(Within, TakesFiniteNumbersInTheRangeAlone) {
+  const CLI::Validator rate = Within(0.5, 4);
+  const CLI::Validator rate_or_max = rate | CLI::IsMember({"max"});
+  for (const std::string good : {"0.5", "1", "4"}) {
+    EXPECT_EQ(rate(good), "") << good;
+    EXPECT_EQ(rate_or_max(good), "") << good;
+  }
+  for (const std::string bad : {"0.4", "4.1", "nan", "-nan", "inf", "-inf", "x", ""}) {
+    EXPECT_NE(rate(bad), "") << bad;
+    EXPECT_NE(rate_or_max(bad), "") << bad;
+  }
+  EXPECT_EQ(rate_or_max("max"), "");
+}
+
 }  // namespace
 }  // namespace pangea

@@ -25,7 +25,7 @@ int RunCommandLine(int argc, char** argv) {
       ->check(CLI::ExistingFile);
   app.add_option("--bus", bus_url, "LCM URL of the agent's bus")->capture_default_str();
   app.add_option("--rate", rate, "1 = as recorded, 2 = twice as fast, max = as the server keeps up")
-      ->check(CLI::Range(1e-3, 1e6) | CLI::IsMember({"max"}))
+      ->check(pangea::Within(1e-3, 1e6) | CLI::IsMember({"max"}))
       ->capture_default_str();
   app.add_option("--duration", options.duration_s, "seconds to play (default: to the end)")
       ->check(Positive());

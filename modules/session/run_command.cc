@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "options/command_line.h"
 #include "session/out_folder.h"
 #include "session/processes/player.h"
 #include "session/run/session_runner.h"
@@ -97,7 +98,7 @@ void AddRunCommand(CLI::App& app, CommandResult* result) {
                   "Folder the recordings are relative to (default: the session file's)");
   run->add_option("--rate", arguments->rate,
                   "1 = as recorded, 2 = twice as fast, ..., max = as fast as everybody keeps up")
-      ->check(CLI::Range(1e-3, 1e6) | CLI::IsMember({"max"}))
+      ->check(Within(1e-3, 1e6) | CLI::IsMember({"max"}))
       ->capture_default_str();
   run->add_option("--journal", arguments->journal,
                   "The server's journal; one of an earlier session is gone on with (default: "

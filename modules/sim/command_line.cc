@@ -105,7 +105,7 @@ void CommandLine::AddPath(CLI::App& app) {
   app.add_option("--knot-spacing", knot_spacing_s_,
                  "seconds between the spline's knots on positions (half of it: on rotations); "
                  "default 0.1 and 0.05, with --imu 0.05 and 0.02")
-      ->check(CLI::Range(0.01, 1.0))
+      ->check(Within(0.01, 1))
       ->group(group);
 }
 
@@ -135,20 +135,20 @@ void CommandLine::AddSensors(CLI::App& app) {
       ->capture_default_str()
       ->group(group);
   app.add_option("--shrink", shrink_, "divide the image's size by this")
-      ->check(CLI::Range(1.0, 8.0))
+      ->check(Within(1, 8))
       ->capture_default_str()
       ->group(group);
   app.add_option("--image-rate", options_.image_rate_hz, "Hz")
-      ->check(CLI::Range(1.0, 100.0))
+      ->check(Within(1, 100))
       ->capture_default_str()
       ->group(group);
   app.add_option("--exposure-ms", exposure_ms_, "motion blur; EuRoC's dark flights: 8")
-      ->check(CLI::Range(0.0, 30.0))
+      ->check(Within(0, 30))
       ->capture_default_str()
       ->group(group);
   app.add_option("--brightness", options_.sensor.brightness,
                  "of the pictures; EuRoC's dark flights: 0.35")
-      ->check(CLI::Range(0.05, 2.0))
+      ->check(Within(0.05, 2))
       ->capture_default_str()
       ->group(group);
   auto* imu = app.add_option("--imu", options_.imu_file,
