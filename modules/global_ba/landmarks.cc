@@ -38,13 +38,16 @@ class Builder {
         continue;
       }
       const Keyframe& keyframe = seen.view->keyframe();
-      int32_t last = kNoLandmark;  // of several corners of one landmark only the first is used
       for (int corner = 0; corner < static_cast<int>(keyframe.corners.size()); ++corner) {
         const int32_t id = keyframe.corners[corner].landmark_id;
-        if (id != kNoLandmark && id != last && seen.view->has_ray(corner)) {
-          tracks_[{keyframe.id.map, id}].own.push_back(Observe(seen, corner, kTrackSigma_px));
+        if (id == kNoLandmark || !seen.view->has_ray(corner)) {
+          continue;
         }
-        last = id;
+        std::vector<BaObservation>& own = tracks_[{keyframe.id.map, id}].own;
+        // Of several corners of one landmark only the first is used.
+        if (own.empty() || own.back().keyframe != i) {
+          own.push_back(Observe(seen, corner, kTrackSigma_px));
+        }
       }
     }
   }

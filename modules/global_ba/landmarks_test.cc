@@ -271,5 +271,21 @@ TEST(GroupWorld, AMissingKeyframeBreaksTheChain) {
   EXPECT_EQ(world.keyframes[3].previous, 2);
 }
 
+// A keyframe has one corner per octave of a landmark, and an odometry may sort them by octave.
+TEST(Landmarks, SeveralCornersOfALandmarkAreOneObservationInAnyOrder) {
+  Group group;
+  const BaWorld once = group.World();
+  for (Keyframe& keyframe : group.messages.keyframes) {
+    const std::vector<Corner> corners = keyframe.corners;
+    for (Corner corner : corners) {
+      ++corner.octave;
+      keyframe.corners.push_back(corner);
+    }
+  }
+  const BaWorld twice = group.World();
+  EXPECT_EQ(twice.landmarks.size(), once.landmarks.size());
+  EXPECT_EQ(twice.observations.size(), once.observations.size());
+}
+
 }  // namespace
 }  // namespace pangea
