@@ -60,6 +60,9 @@ class Counter {
     if (DecodeMessage(data, &message)) {
       if (const auto id = Parse(message.id).value) {
         info_->keyframes[id->map].insert(id->seq);
+        if (message.has_edge && message.edge_from_seq < id->seq - 1) {
+          info_->long_edges[*id] = message.edge_from_seq;
+        }
       }
     }
   }
@@ -101,8 +104,15 @@ std::string DamageOf(const SiteInfo& info) {
   return damage.whole() ? "none" : DescribeLoss(damage);
 }
 
-std::string Missing(const std::set<int32_t>& seqs) {
-  const int64_t missing = *seqs.rbegin() + 1 - std::ssize(seqs);
+std::string Missing(const SiteInfo& info, const MapId& map) {
+  int64_t missing = 0;
+  int32_t next = 0;
+  for (const int32_t seq : info.keyframes.at(map)) {
+    const auto edge = info.long_edges.find({map, seq});
+    const bool leads_over = edge != info.long_edges.end() && edge->second == next - 1;
+    missing += leads_over ? 0 : seq - next;
+    next = seq + 1;
+  }
   return missing == 0 ? "" : fmt::format(", {} missing", missing);
 }
 
@@ -182,8 +192,8 @@ std::string ToText(const SiteInfo& info) {
     text += Line("checkpoint", fmt::format("{}: {}", process, said));
   }
   for (const auto& [map, seqs] : info.keyframes) {
-    text +=
-        Line("map", fmt::format("{}: {} keyframes{}", ToString(map), seqs.size(), Missing(seqs)));
+    text += Line("map",
+                 fmt::format("{}: {} keyframes{}", ToString(map), seqs.size(), Missing(info, map)));
   }
   return text;
 }

@@ -22,6 +22,8 @@ struct SiteInfo {
   int64_t bytes = 0;                             // size of its folder
   int64_t free_bytes = 0;                        // free on its disk
   std::map<MapId, std::set<int32_t>> keyframes;  // seqs by map
+  // Where the odometry edges begin that lead over keyframes; those do not exist (thinning).
+  std::map<KeyframeId, int32_t> long_edges;
   int64_t matches = 0;
   int64_t constraints_accepted = 0, constraints_refused = 0;
   int64_t anchors = 0;                             // not deleted

@@ -8,6 +8,8 @@
 #include <fstream>
 
 #include "checkpoint/checkpoint_file.h"
+#include "messages/encoding.h"
+#include "messages/messages.h"
 #include "site/site_delete.h"
 #include "site/site_info.h"
 #include "site/site_test_world.h"
@@ -140,6 +142,27 @@ TEST(SiteInfo, CountsWhatIsThere) {
   EXPECT_GT(info.free_bytes, 0);
   EXPECT_THAT(ToText(info), HasSubstr("damage       none\n"));
   EXPECT_THAT(ListSites(site.folder.parent_path()), HasSubstr("not in use"));
+}
+
+// Those that were thinned away are not lost.
+TEST(SiteInfo, CallsOnlyKeyframesMissingThatNoEdgeLeadsOver) {
+  std::vector<StoredEvent> events;
+  for (StoredEvent& event : WalksOf({1})) {
+    KeyframeMessage keyframe{};
+    if (event.channel != "KEYFRAME_1" || !DecodeMessage(event.data, &keyframe)) {
+      continue;
+    }
+    const int32_t seq = keyframe.id.seq;
+    if (seq == 8) {
+      keyframe.edge_from_seq = 4;
+      event.data = EncodeMessage(keyframe);
+    }
+    if ((seq < 5 || seq > 7) && seq != 20 && seq != 21) {
+      events.push_back(event);
+    }
+  }
+  const Site site = MakeSite(FreshFolder("info_gaps") / "hall", events);
+  EXPECT_THAT(ToText(ReadInfo(site)), HasSubstr("27 keyframes, 2 missing\n"));
 }
 
 TEST(SiteInfo, TellsHowMuchOfTheJournalACheckpointCovers) {
