@@ -1,6 +1,7 @@
 #include "log_tools/log_edit.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -120,7 +121,8 @@ void ListEvents(const std::string& log, const LogCut& cut, ListAs as, std::ostre
   }
 }
 
-NewLog::NewLog(std::string path) : path_(std::move(path)) {
+NewLog::NewLog(const std::string& path)
+    : path_(path), made_(fmt::format("{}.new-{}", path, getpid())) {
   if (std::filesystem::exists(path_)) {
     throw std::runtime_error(
         fmt::format("{}: exists; give another name, nothing is overwritten", path_));
@@ -128,17 +130,23 @@ NewLog::NewLog(std::string path) : path_(std::move(path)) {
 }
 
 NewLog::~NewLog() {
-  if (writer_ && !kept_) {
+  if (writer_) {
     std::error_code ignored;
-    std::filesystem::remove(path_, ignored);
+    std::filesystem::remove(made_, ignored);
   }
 }
 
 void NewLog::Write(int64_t utime, const std::string& channel, Bytes data) {
   if (!writer_) {
-    writer_.emplace(path_);
+    writer_.emplace(made_);
   }
   writer_->Write(utime, channel, data);
+  ++count_;
+}
+
+void NewLog::Keep() {
+  std::filesystem::rename(made_, path_);
+  writer_.reset();
 }
 
 int64_t CutLog(const std::string& log, const LogCut& cut, const std::string& out,

@@ -32,25 +32,27 @@ enum class ListAs : uint8_t {
 void ListEvents(const std::string& log, const LogCut& cut, ListAs as, std::ostream& out,
                 LogReadings* readings = nullptr);
 
-// A new log. It is removed again unless Keep is called: a part of a log must not pass for the
-// whole.
+// A new log, under a temporary name until Keep: a part of a log must not pass for the whole.
+// Without Keep it is removed.
 class NewLog {
  public:
   // Throws std::runtime_error if the file exists: nothing is overwritten.
-  explicit NewLog(std::string path);
+  explicit NewLog(const std::string& path);
   ~NewLog();
   NewLog(const NewLog&) = delete;
   NewLog& operator=(const NewLog&) = delete;
 
   // The file is made when it is first written to. Throws std::runtime_error.
   void Write(int64_t utime, const std::string& channel, Bytes data);
-  void Keep() { kept_ = true; }
-  int64_t count() const { return writer_ ? writer_->count() : 0; }
+  // At least one event must have been written.
+  void Keep();
+  int64_t count() const { return count_; }
 
  private:
   const std::string path_;
+  const std::string made_;  // the temporary name
   std::optional<LogFileWriter> writer_;
-  bool kept_ = false;
+  int64_t count_ = 0;
 };
 
 // Both return the number of events written. They throw std::runtime_error if a log cannot be read,

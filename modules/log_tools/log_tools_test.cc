@@ -173,6 +173,18 @@ TEST_F(LogToolsTest, CutsChannelsAndOverwritesNothing) {
   EXPECT_FALSE(fs::exists(Path("other.lcm")));
 }
 
+// Also if the program is killed, a part of a log does not pass for the whole.
+TEST_F(LogToolsTest, ANewLogGetsItsNameWhenItIsComplete) {
+  const std::string path = Path("new.lcm");
+  NewLog log(path);
+  log.Write(1, "A", std::vector<uint8_t>{1});
+  EXPECT_FALSE(fs::exists(path));
+  log.Keep();
+  EXPECT_EQ(log.count(), 1);
+  EXPECT_EQ(Events(path).size(), 1u);
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()), 1);
+}
+
 TEST_F(LogToolsTest, AListWithoutAnEventIsRefusedAsACutIs) {
   std::ostringstream out;
   EXPECT_THAT([&] { ListEvents(kSample, {.channels = "NOPE"}, ListAs::kLines, out); },
