@@ -149,14 +149,15 @@ async function testAnchor(page) {
   check("it is where it belongs in the image", error < 2, `${error.toFixed(2)} px`);
   await testOther(page);
   await page.mouse.click(90, 300);
-  await page.locator("#anchor_name").fill("tap");
+  await page.locator("#anchor_name").fill(`tap ${"名".repeat(20)}`);
   await screenshot(page, "place");
   await page.locator("#anchor_dialog [value=place]").click();
   await becomes(page, "a tap places an anchor", () => JSON.parse(pangea.walk.vio.text).edits.length === 1);
   const { edits: [edit] } = await told(page);
   // 360 x 720 shows the middle of 640 x 480, 1.5 times as large.
   const [u, v] = [(90 + 300) / 1.5 - 0.5, 300 / 1.5 - 0.5];
-  check("at the pixel that was tapped", edit.name === "tap" && Math.hypot(edit.pixel[0] - u, edit.pixel[1] - v) < 0.1, String(edit.pixel));
+  check("with as much of its name as fits in 50 bytes", edit.name === `tap ${"名".repeat(15)}`, edit.name);
+  check("at the pixel that was tapped", Math.hypot(edit.pixel[0] - u, edit.pixel[1] - v) < 0.1, String(edit.pixel));
 }
 
 // A screen reader reads the hint when it is set, so it must be set only when it changes.

@@ -2,6 +2,7 @@
 // what the server answers.
 
 import { Vector3 } from "three";
+import { anchorName } from "../../../web/page/anchor_name";
 import type { Connection } from "./connection";
 import type { Model } from "./model";
 import { byId, element, keyed, metres, tell } from "./panels";
@@ -9,18 +10,8 @@ import type { AnchorSaid } from "./protocol";
 import type { Stage } from "./stage";
 
 const kMaxListed = 200;
-const kMaxNameBytes = 50; // kMaxAnchorName of core/anchor.h
 const kClickPixels = 4; // a shorter movement of the pointer is a click and not a drag
 const kSure_ms = 3000; // time in which delete must be pressed again
-
-const fits = (name: string) => new TextEncoder().encode(name).length <= kMaxNameBytes;
-
-// The text as a name: without control characters, and cut to kMaxNameBytes.
-export function nameOf(text: string): string {
-  const name = [...text.replace(/[\u0000-\u001f\u007f]/g, " ").trim()];
-  while (!fits(name.join(""))) name.pop();
-  return name.join("");
-}
 
 export const madeBy = ({ id }: AnchorSaid) => (id[0] === 0 ? "a tool on the server" : `agent ${id[0]}`);
 
@@ -174,7 +165,7 @@ export class AnchorTools {
       return;
     }
     this.place(false);
-    const name = nameOf((await askName()) ?? "");
+    const name = anchorName((await askName()) ?? "");
     if (!name) return;
     this.connection.say({
       anchor_add: { name, keyframe: place.keyframe, p_body: [place.p_body.x, place.p_body.y, place.p_body.z] },

@@ -1,5 +1,6 @@
 // Taps on the camera's image: a tap places an anchor, or opens the dialog of the anchor that it hits.
 
+import { anchorName } from "../../../../web/page/anchor_name";
 import { askDialog, byId } from "../dom";
 import type { Stage } from "../view/stage";
 import type { Walk } from "../walk";
@@ -29,7 +30,7 @@ export async function onTap(
 async function askName(): Promise<string> {
   const field = byId<HTMLInputElement>("anchor_name");
   field.value = "";
-  return (await askDialog("anchor_dialog")) === "place" ? field.value.trim() : "";
+  return (await askDialog("anchor_dialog")) === "place" ? anchorName(field.value) : "";
 }
 
 async function asksToRemove(name: string, owner: string | undefined): Promise<boolean> {
