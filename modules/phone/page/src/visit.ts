@@ -189,10 +189,9 @@ export class Visit {
       this.xrFails = device.isBlind;
       if (device.isBlind) this.events.onNotice("AR gives no camera images here. Start again: the page tracks by itself then.");
     };
-    const membership = await this.admit();
+    const membership = await this.begin(run, true);
     if (run !== this.run) return true;
     this.wakeLock.keep();
-    this.isLive = true;
     device.onCamera = async (cameraYaml) => {
       const newest = ++this.run; // a screen that is rotated there and back starts two walks
       await this.walk?.close();

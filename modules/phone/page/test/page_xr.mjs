@@ -42,6 +42,12 @@ export async function testXr(browser, url) {
   await page.locator("#stop").click();
   check("stopping ends the session", (await page.locator("#welcome").isVisible()) && (await page.evaluate(() => xrSession.ended)));
   check("and frees what it had on the graphics card", (await page.evaluate(() => numSamplers)) === 0);
+  await page.evaluate(() => (window.xrLost = true));
+  await page.locator("#start").click();
+  await page.waitForTimeout(1500);
+  const hint = await page.locator("#hint").textContent();
+  check("the next start waits for AR, too, and shows nothing of the last walk", /AR finds its way/.test(hint), hint);
+  await page.locator("#stop").click();
   await page.close();
 }
 
