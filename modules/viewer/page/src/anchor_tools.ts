@@ -6,7 +6,7 @@ import { anchorName } from "../../../web/page/anchor_name";
 import type { Connection } from "./connection";
 import type { Model } from "./model";
 import { byId, element, keyed, metres, tell } from "./panels";
-import type { AnchorSaid } from "./protocol";
+import type { AnchorSaid, Said } from "./protocol";
 import type { Stage } from "./stage";
 
 const kMaxListed = 200;
@@ -86,7 +86,7 @@ export class AnchorTools {
   // Deleting cannot be undone, so the button must be pressed twice.
   private delete(button: HTMLElement, said: AnchorSaid) {
     if (button.dataset.sure) {
-      this.connection.say({ anchor_delete: { anchor: said.id } });
+      this.ask({ anchor_delete: { anchor: said.id } });
       return;
     }
     button.dataset.sure = "yes";
@@ -144,6 +144,11 @@ export class AnchorTools {
     }
   }
 
+  // Asks the server for a change.
+  private ask(change: Said) {
+    if (!this.connection.say(change)) this.announce("Not connected: nothing was changed");
+  }
+
   private endDrag() {
     this.down = this.drag = undefined;
     this.stage.holdCamera(false);
@@ -153,9 +158,7 @@ export class AnchorTools {
     const anchor = this.model.anchors.get(index);
     if (!anchor?.moved) return; // it was deleted or changed meanwhile
     const { t } = anchor.moved.T_holder_anchor;
-    this.connection.say({
-      anchor_move: { anchor: anchor.said.id, keyframe: anchor.holder, p_body: [t.x, t.y, t.z] },
-    });
+    this.ask({ anchor_move: { anchor: anchor.said.id, keyframe: anchor.holder, p_body: [t.x, t.y, t.z] } });
   }
 
   private async placeAt(x: number, y: number) {
@@ -167,7 +170,7 @@ export class AnchorTools {
     this.place(false);
     const name = anchorName((await askName()) ?? "");
     if (!name) return;
-    this.connection.say({
+    this.ask({
       anchor_add: { name, keyframe: place.keyframe, p_body: [place.p_body.x, place.p_body.y, place.p_body.z] },
     });
   }

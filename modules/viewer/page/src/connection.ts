@@ -17,8 +17,10 @@ export class Connection {
     this.connect();
   }
 
-  say(said: Said) {
+  // False if there is no connection.
+  say(said: Said): boolean {
     if (this.open) this.socket?.send(JSON.stringify(said));
+    return this.open;
   }
 
   private connect() {

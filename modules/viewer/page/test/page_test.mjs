@@ -160,7 +160,7 @@ async function testSeekBack(page) {
 
 async function testLive(browser) {
   const bus = `udpm://239.255.76.67:${20000 + (process.pid % 30000)}?ttl=0&recv_buf_size=4194304`;
-  const { url } = await startViewer("--bus", bus);
+  const { url, viewer } = await startViewer("--bus", bus);
   const page = await openPage(browser, url);
   await becomes(page, "an empty bus says what it waits for", () =>
     document.getElementById("empty").textContent.startsWith("Waiting for agents on udpm:"));
@@ -188,6 +188,17 @@ async function testLive(browser) {
   check("live: no time slider", await page.locator("#player").isHidden());
   await testPhones(page, bus);
   await testLiveAnchors(page);
+  await testDisconnected(page, viewer);
+}
+
+// A change that cannot be sent is not lost silently.
+async function testDisconnected(page, viewer) {
+  viewer.kill();
+  await becomes(page, "without the viewer it is not connected", () => document.getElementById("connection").textContent !== "");
+  for (let i = 0; i < 2; ++i) await page.locator(".anchor .delete").first().click();
+  await becomes(page, "and says that nothing was changed", () =>
+    /^Not connected/.test(document.getElementById("notice").textContent), undefined, 5000);
+  await page.close();
 }
 
 // With a gateway, the page must show where phones join, as a QR code that can be read.
@@ -400,4 +411,4 @@ await run(async () => {
   await testLive(browser);
   await testTwelve(browser);
   await browser.close();
-}, /broken by the test/);
+}, /broken by the test|ERR_CONNECTION_REFUSED/);
