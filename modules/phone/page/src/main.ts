@@ -39,9 +39,13 @@ function onLeave() {
   welcome.show();
 }
 
+let numUnsaved = 0; // finished recordings
+
 function onRecorded(recorder: Recorder) {
   panels.showRecording();
-  attempt(recorder.finish().then((zip) => saveRecording(zip, recorder.name, welcome.membership, notice)));
+  ++numUnsaved;
+  const saved = recorder.finish().then((zip) => saveRecording(zip, recorder.name, welcome.membership, notice));
+  attempt(saved.finally(() => --numUnsaved));
 }
 
 // Tells the visitor why it failed.
@@ -108,6 +112,10 @@ async function openDrop(items: DataTransferItemList) {
 
 // --- the tab and the screen
 
+// The browser asks before it leaves the page, which would lose a recording.
+addEventListener("beforeunload", (event) => {
+  if (visit.walk?.recorder || numUnsaved > 0) event.preventDefault();
+});
 // A link with a code or an option that is opened in this tab: the browser does not load the page again.
 addEventListener("hashchange", () => panels.shown || location.reload());
 document.addEventListener("visibilitychange", () => {

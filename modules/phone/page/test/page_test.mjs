@@ -198,6 +198,11 @@ async function testOther(page) {
 async function testRecording(page) {
   await page.locator("#record").click();
   await becomes(page, "images are recorded", () => pangea.walk.recorder?.numImages > 20);
+  const asked = page.waitForEvent("dialog", { timeout: 5000 }).catch(() => undefined);
+  await page.evaluate(() => void setTimeout(() => location.reload()));
+  const dialog = await asked;
+  check("a page that records asks before it is left", dialog?.type() === "beforeunload");
+  await dialog?.dismiss();
   const downloading = page.waitForEvent("download");
   await page.locator("#record").click();
   const zip = `${options.out}/phone_recorded.zip`;
