@@ -19,6 +19,8 @@ import { matrixOf } from "./view/poses";
 import type { Stage } from "./view/stage";
 import type { XrFrame, XrImage, XrOdometry } from "./xr/xr_odometry";
 
+const kCameraSilence_ms = 3000;
+
 export interface WalkEvents {
   onPose(pose: PhonePose): void;
   onNotice(text: string): void;
@@ -36,6 +38,7 @@ export class Walk {
   motionSilent = false;
   numImages = 0; // number of images that the agent has processed
   recorder?: Recorder;
+  private newestImage_ms?: number; // when the phone's camera gave it; undefined with other input
   private stopSensors = () => {};
   private readonly client: AgentClient;
   private taken = () => {}; // called when the agent has processed its image
@@ -56,6 +59,7 @@ export class Walk {
   static live(camera: Camera, cameraYaml: string, membership: Membership | undefined, stage: Stage, events: WalkEvents): Walk {
     const model = parseCamera(cameraYaml, "the stored calibration");
     const walk = new Walk(model, { camera: cameraYaml, imu: kPhoneImu }, membership, stage, events);
+    walk.newestImage_ms = performance.now();
     camera.onImage = (image) => walk.onCamera(image);
     camera.onEnd = ({ message }) => events.onFailure(message);
     const motion = new Motion((sample) => walk.addImu(sample), () => (walk.motionSilent = true));
@@ -130,6 +134,11 @@ export class Walk {
     this.recorder = new Recorder(`walk_${new Date().toISOString().replace(/[:.]/g, "-")}`, this.yaml.camera, this.yaml.imu ?? kPhoneImu);
   }
 
+  // The camera is open, but gives no images, for instance because another app has taken it.
+  get cameraSilent(): boolean {
+    return this.newestImage_ms !== undefined && performance.now() - this.newestImage_ms > kCameraSilence_ms;
+  }
+
   // Number of keyframes that the server has not acknowledged.
   get numUnsent(): number {
     return this.uplink?.counters.pending ?? 0;
@@ -141,6 +150,7 @@ export class Walk {
   );
 
   private onCamera(image: CameraImage) {
+    this.newestImage_ms = performance.now();
     this.recorder?.addImage(image);
     this.frames.add(image);
   }

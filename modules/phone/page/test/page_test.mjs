@@ -268,6 +268,12 @@ async function testInterruptions(browser, url) {
     document.getElementById("welcome").checkVisibility() && /took the camera away/.test(document.getElementById("notice").textContent));
   await page.locator("#start").click();
   await hasOneNewAgent(page, "after which one can start too");
+  await page.evaluate(() => streams.at(-1).getVideoTracks()[0].stop());
+  await becomes(page, "a camera that gives no more images is named", () =>
+    /^The camera gives no images/.test(document.getElementById("hint").textContent), undefined, 10_000);
+  await page.locator("#stop").click();
+  await page.locator("#start").click();
+  await hasOneNewAgent(page, "after which one can start as well");
   await recordsUntil(page, "Stop", () => page.locator("#stop").click());
 
   await page.locator("#start").click();

@@ -7,11 +7,12 @@ import type { Situation } from "./hints";
 const pose: PhonePose = {
   utime: 1, state: "tracking", reason: "", map: "2/5", T_odom_body: [0, 0, 0, 0, 0, 0, 1], fused: false, numTracked: 100,
 };
-const good: Situation = { pose, brightness: 120, link: "open", together: [], motionSilent: false };
+const good: Situation = { pose, brightness: 120, link: "open", together: [], motionSilent: false, cameraSilent: false };
 const says = (change: Partial<Situation>) => hintOf({ ...good, ...change }).text;
 
 test("what to do comes before what is good", () => {
   assert.match(says({ motionSilent: true }), /no motion/);
+  assert.match(says({ cameraSilent: true }), /camera gives no images/);
   assert.match(says({ pose: undefined }), /Starting/);
   assert.match(says({ pose: { ...pose, state: "initialising", reason: "not enough motion yet: velocity" } }), /Move sideways/);
   const otherSize = "1280x720 pixels, but the calibration is of 640x480";

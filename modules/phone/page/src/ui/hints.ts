@@ -11,6 +11,7 @@ export interface Situation {
   link?: LinkState; // undefined: the agent runs without a server
   together: string[]; // names of the people whose map is fused with this one
   motionSilent: boolean;
+  cameraSilent: boolean;
 }
 
 export interface Hint {
@@ -23,8 +24,9 @@ const kTooDark = "Too dark: find more light.";
 const kDark = 25;
 const kFewFeatures = 25;
 
-export function hintOf({ pose, brightness, link, together, motionSilent }: Situation): Hint {
+export function hintOf({ pose, brightness, link, together, motionSilent, cameraSilent }: Situation): Hint {
   if (motionSilent) return { text: kNoMotion, tone: "bad" };
+  if (cameraSilent) return { text: "The camera gives no images. Does another app use it?", tone: "bad" };
   if (!pose) return { text: "Starting…", tone: "do" };
   const tracking = pose.state === "tracking";
   if (brightness < kDark && (!tracking || pose.numTracked < kFewFeatures)) return { text: kTooDark, tone: "bad" };

@@ -70,7 +70,7 @@ export class Panels {
       byId("numbers").textContent = `${Math.round(100 * calibration.progress.share)} % calibrated`;
     }
     if (!walk || !this.shown) return;
-    this.showHint(hintOf({ ...walk, together: this.together() }));
+    this.showHint(hintOf({ ...walk, cameraSilent: walk.cameraSilent, together: this.together() }));
     byId<HTMLMeterElement>("quality").value = walk.pose?.state === "tracking" ? walk.pose.numTracked : 0;
     this.rate_hz += 0.3 * (((walk.numImages - this.imagesBefore) * 1000) / kInterval_ms - this.rate_hz);
     this.imagesBefore = walk.numImages;
