@@ -29,7 +29,7 @@ inline double UnknownScaleSigma(double scale_sigma) {
 }
 
 // The same for a whole map: it uses the median over the keyframes, because the first keyframes know
-// the scale least. 0 without keyframes.
+// the scale least. Those that do not know it at all yet (0) do not count, unless all are 0.
 double UnknownScaleSigma(const std::vector<double>& scale_sigmas);
 
 struct Corner {
@@ -79,7 +79,7 @@ struct Keyframe {
   std::vector<MapPoint> points;
   int64_t group_revision = 0;  // of the newest correction that the agent had applied; 0: none
   // Errors that all keyframes of a map share. The covariances above do not include them.
-  double scale_sigma = 0;  // of all lengths, as a share, at most kMaxScaleSigma; 0: scale is exact
+  double scale_sigma = 0;  // as a share of lengths, at most kMaxScaleSigma; 0: exact, or no depth yet
   Matrix6d T_body_cam_covariance = Matrix6d::Zero();  // (translation, rotation), body; 0: exact
 
   Rigid3 T_odom_cam() const { return T_odom_body * camera.T_body_cam; }
