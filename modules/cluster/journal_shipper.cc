@@ -81,7 +81,7 @@ void JournalShipper::OnJournalFile(const JournalFile& file) {
   if (shipped_.path != file.path) {
     const JournalCursor cursor = JournalCursor::Read(file.path, streams_);
     shipped_ = {file.path, cursor.file};
-    sequence_ = written_ = cursor.sequence;
+    sequence_ = tried_ = cursor.sequence;
     mark_ = cursor;
   }
   if (file.state.num_bytes < shipped_.state.num_bytes) {
@@ -170,13 +170,13 @@ void JournalShipper::Mark() {
       mark_ = {shipped_.state, sequence_, term_};
     }
   }
-  if (mark_.sequence == written_) {
+  if (mark_.sequence == tried_) {
     return;
   }
+  tried_ = mark_.sequence;
   try {
     mark_.Write(shipped_.path);
-    written_ = mark_.sequence;
-  } catch (const std::runtime_error&) {  // a full disk: the next start takes longer
+  } catch (const std::runtime_error&) {  // a full disk: a start before the next mark takes longer
   }
 }
 

@@ -90,7 +90,7 @@ class JournalShipper {
   uint64_t sequence_ = 0;  // of the newest message that the file has too
   uint64_t end_ = 0;       // newest known sequence of the stream
   JournalCursor mark_;     // at the newest term that the file has passed
-  uint64_t written_ = 0;   // sequence of the mark that was written to the disk
+  uint64_t tried_ = 0;     // sequence of the mark that was last written, or could not be
   int64_t num_too_large_ = 0;
 };
 
