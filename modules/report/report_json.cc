@@ -164,11 +164,10 @@ ordered_json ReportJson(const ReportInput& input, const CapturedSession& session
   // The first group has the most agents.
   json["ate_joint_m"] = metrics.groups.empty() ? ordered_json() : JointJson(metrics.groups.front());
   const ConstraintCounts counts = CountConstraints(session);
-  json["constraints"] = {{"accepted", counts.accepted_inter + counts.accepted_intra},
-                         {"accepted_inter", counts.accepted_inter},
-                         {"accepted_intra", counts.accepted_intra},
-                         {"refused", counts.num_refused},
-                         {"refused_by_reason", counts.refused}};
+  json["constraints"] = {
+      {"accepted", counts.num_accepted()},       {"accepted_inter", counts.accepted_inter},
+      {"accepted_intra", counts.accepted_intra}, {"accepted_derived", counts.accepted_derived},
+      {"refused", counts.num_refused},           {"refused_by_reason", counts.refused}};
   json["constraints_truth"] = TruthJson(metrics.all_constraints);
   json["constraints_truth"]["inter"] = TruthJson(metrics.inter_constraints);
   json["constraints_truth"]["intra"] = TruthJson(metrics.intra_constraints);

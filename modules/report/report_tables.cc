@@ -203,9 +203,11 @@ std::vector<std::string> ChangeLines(const CapturedSession& session, const Repor
 
 std::string ConstraintsLine(const CapturedSession& session) {
   const ConstraintCounts counts = CountConstraints(session);
-  return fmt::format("{} accepted ({} by fusion, {} by inter_map_ba), {} refused.",
-                     counts.accepted_inter + counts.accepted_intra, counts.accepted_inter,
-                     counts.accepted_intra, counts.num_refused);
+  const std::string derived =
+      counts.accepted_derived > 0 ? fmt::format(", {} by thinning", counts.accepted_derived) : "";
+  return fmt::format("{} accepted ({} by fusion, {} by inter_map_ba{}), {} refused.",
+                     counts.num_accepted(), counts.accepted_inter, counts.accepted_intra, derived,
+                     counts.num_refused);
 }
 
 }  // namespace pangea

@@ -58,6 +58,8 @@ ConstraintCounts CountConstraints(const CapturedSession& session) {
       ++counts.refused[WithoutNumbers(constraint.reason)];
     } else if (constraint.kind == PlaceKind::kIntra) {
       ++counts.accepted_intra;
+    } else if (constraint.kind == PlaceKind::kDerived) {
+      ++counts.accepted_derived;
     } else {
       ++counts.accepted_inter;
     }

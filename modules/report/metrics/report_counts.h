@@ -13,8 +13,11 @@ namespace pangea {
 struct ConstraintCounts {
   int accepted_intra = 0;
   int accepted_inter = 0;
+  int accepted_derived = 0;            // in place of those that thinning removed
   std::map<std::string, int> refused;  // by reason, with '#' for its numbers
   int num_refused = 0;
+
+  int num_accepted() const { return accepted_intra + accepted_inter + accepted_derived; }
 };
 
 ConstraintCounts CountConstraints(const CapturedSession& session);

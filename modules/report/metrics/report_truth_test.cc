@@ -6,6 +6,9 @@
 #include <cmath>
 #include <random>
 
+#include "report/metrics/report_counts.h"
+#include "report/report_tables.h"
+
 namespace pangea {
 namespace {
 
@@ -122,6 +125,23 @@ TEST(ConstraintsTruth, OnlyAcceptedOnesWithGroundTruthAtBothEndsAreChecked) {
   const Rigid3 T_from{YawRotation(0.4), {2, 3, 0}};
   const Rigid3 T_to{YawRotation(0.8), {4, 6, 0}};
   EXPECT_LT(known[0].T_from_to.Minus(T_from.Inverse() * T_to).norm(), 1e-9);
+}
+
+// No verifier made the constraints that thinning derived.
+TEST(ReportCounts, AreByWhatMadeTheConstraint) {
+  CapturedSession session;
+  for (const PlaceKind kind : {PlaceKind::kInter, PlaceKind::kIntra, PlaceKind::kDerived}) {
+    Constraint constraint;
+    constraint.kind = kind;
+    constraint.accepted = true;
+    session.constraints[static_cast<int64_t>(kind)] = constraint;
+  }
+  const ConstraintCounts counts = CountConstraints(session);
+  EXPECT_EQ(counts.accepted_inter, 1);
+  EXPECT_EQ(counts.accepted_intra, 1);
+  EXPECT_EQ(counts.accepted_derived, 1);
+  EXPECT_EQ(ConstraintsLine(session),
+            "3 accepted (1 by fusion, 1 by inter_map_ba, 1 by thinning), 0 refused.");
 }
 
 }  // namespace
