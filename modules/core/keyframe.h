@@ -79,7 +79,7 @@ struct Keyframe {
   std::vector<MapPoint> points;
   int64_t group_revision = 0;  // of the newest correction that the agent had applied; 0: none
   // Errors that all keyframes of a map share. The covariances above do not include them.
-  double scale_sigma = 0;  // as a share of lengths, at most kMaxScaleSigma; 0: exact, or no depth yet
+  double scale_sigma = 0;  // share of lengths, at most kMaxScaleSigma; 0: exact, or no depth yet
   Matrix6d T_body_cam_covariance = Matrix6d::Zero();  // (translation, rotation), body; 0: exact
 
   Rigid3 T_odom_cam() const { return T_odom_body * camera.T_body_cam; }

@@ -8,6 +8,7 @@
 #include "bus/process.h"
 #include "link/wire.h"
 #include "messages/channels.h"
+#include "web/web_rules.h"
 
 namespace pangea {
 namespace {
@@ -31,9 +32,7 @@ Gateway::Public PublicOf(const site::Site& site, const GatewayProcess::Options& 
 
 GatewayAddress AddressOf(const GatewayProcess::Options& options, uint16_t port) {
   const GatewayIdentity& identity = options.identity;
-  const bool is_ipv6 = options.url_host.find(':') != std::string::npos;
-  const std::string host = is_ipv6 ? fmt::format("[{}]", options.url_host) : options.url_host;
-  return {fmt::format("https://{}:{}/", host, port),
+  return {fmt::format("https://{}:{}/", web::HostInUrl(options.url_host), port),
           Fingerprint(identity.authority_pem.empty() ? identity.server.certificate_chain_pem
                                                      : identity.authority_pem)};
 }

@@ -8,6 +8,7 @@
 #include "bus/process.h"
 #include "viewer/log_show.h"
 #include "viewer/web/page_site.h"
+#include "web/web_rules.h"
 
 namespace pangea::viewer {
 namespace {
@@ -17,7 +18,8 @@ constexpr int kMaxMessagesAtOnce = 500;
 constexpr const char* kNoPage = "scripts/viewer builds it (with npm), or give --page FOLDER";
 
 void Announce(const web::WebServer& server, const web::WebOptions& options) {
-  std::cout << fmt::format("http://{}:{}/\n", options.listen, server.port()) << std::flush;
+  std::cout << fmt::format("http://{}:{}/\n", web::HostInUrl(options.listen), server.port())
+            << std::flush;
 }
 
 void HandleWaiting(LcmBus& bus) {

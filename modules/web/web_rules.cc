@@ -49,6 +49,10 @@ bool HostAllowed(std::string_view host, const std::vector<std::string>& names) {
          std::ranges::any_of(names, [&name](const auto& other) { return IsSameName(name, other); });
 }
 
+std::string HostInUrl(const std::string& host) {
+  return host.find(':') == std::string::npos ? host : fmt::format("[{}]", host);
+}
+
 bool OriginAllowed(std::string_view origin, std::string_view host) {
   return !host.empty() &&
          (origin == fmt::format("http://{}", host) || origin == fmt::format("https://{}", host));

@@ -14,6 +14,9 @@ namespace pangea::web {
 // to 65535 in digits). So no other text from it gets into the answer's headers.
 bool HostAllowed(std::string_view host, const std::vector<std::string>& names);
 
+// The host as a URL has it: an IPv6 address is in brackets.
+std::string HostInUrl(const std::string& host);
+
 // Whether the Origin header is that of a page which this server itself served under `host`.
 bool OriginAllowed(std::string_view origin, std::string_view host);
 

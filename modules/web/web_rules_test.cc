@@ -28,6 +28,13 @@ TEST(WebRules, HostsThatAreThisMachine) {
   }
 }
 
+TEST(WebRules, AnIpv6AddressIsInBracketsInAUrl) {
+  EXPECT_EQ(HostInUrl("::1"), "[::1]");
+  for (const char* host : {"127.0.0.1", "robot.local"}) {
+    EXPECT_EQ(HostInUrl(host), host);
+  }
+}
+
 TEST(WebRules, OriginsThatAreThisServer) {
   EXPECT_TRUE(OriginAllowed("http://127.0.0.1:8080", "127.0.0.1:8080"));
   EXPECT_TRUE(OriginAllowed("https://robot.local", "robot.local"));

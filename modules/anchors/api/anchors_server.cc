@@ -7,6 +7,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include "web/web_rules.h"
+
 namespace pangea {
 
 web::WebOptions ListenAt(const std::string& address_and_port) {
@@ -33,9 +35,7 @@ AnchorsServer::AnchorsServer(Bus& bus, const AnchorsOptions& options,
       api_(process_.anchors(), options, [this](const AnchorEdit& edit) { process_.Request(edit); }),
       server_(web_options, api_) {
   process_.OnEditTaken(std::bind_front(&AnchorApi::Take, &api_));
-  const bool is_v6 = web_options.listen.find(':') != std::string::npos;
-  std::cout << fmt::format("http://{}{}{}:{}/v1/\n", is_v6 ? "[" : "", web_options.listen,
-                           is_v6 ? "]" : "", port())
+  std::cout << fmt::format("http://{}:{}/v1/\n", web::HostInUrl(web_options.listen), port())
             << std::flush;
 }
 
