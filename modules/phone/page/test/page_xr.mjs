@@ -44,9 +44,8 @@ export async function testXr(browser, url) {
   check("and frees what it had on the graphics card", (await page.evaluate(() => numSamplers)) === 0);
   await page.evaluate(() => (window.xrLost = true));
   await page.locator("#start").click();
-  await page.waitForTimeout(1500);
-  const hint = await page.locator("#hint").textContent();
-  check("the next start waits for AR, too, and shows nothing of the last walk", /AR finds its way/.test(hint), hint);
+  await becomes(page, "the next start waits for AR, too, and shows nothing of the last walk", () =>
+    /AR finds its way/.test(document.getElementById("hint").textContent));
   await page.locator("#stop").click();
   await page.close();
 }
