@@ -33,7 +33,7 @@ class GroupStates {
 
   // The state becomes the newest one of each of its maps that has no newer state.
   Pointer Take(State state) {
-    const auto taken = std::make_shared<const State>(std::move(state));
+    auto taken = std::make_shared<const State>(std::move(state));
     for (const MapId& map : taken->maps) {
       Pointer& newest = newest_[map];
       if (newest == nullptr || newest->revision < taken->revision) {
