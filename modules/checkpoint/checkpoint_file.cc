@@ -194,7 +194,9 @@ bool CheckpointReader::Read(void* data, size_t size) {
       return false;
     }
   }
-  std::memcpy(data, buffer_.data() + (at_ - buffer_at_), size);
+  if (size > 0) {  // `data` of nothing may be null
+    std::memcpy(data, buffer_.data() + (at_ - buffer_at_), size);
+  }
   at_ += static_cast<int64_t>(size);
   return true;
 }
