@@ -7,7 +7,7 @@ if(CCACHE)
 endif()
 
 add_compile_options(-Wall -Wextra -Wpedantic -Werror)
-# GCC collects its garbage only above 1 GB (kB here): a tenth less time for a tenth more memory.
+# GCC collects its garbage only above 1 GB (kB here): a tenth less time for a fifth more memory.
 add_compile_options($<$<CXX_COMPILER_ID:GNU>:--param=ggc-min-heapsize=1000000>)
 # x86-64-v2 has popcnt, which Hamming distances need. A newer level would change the alignment of
 # Eigen types, which must agree with Debian's Ceres. -ffp-contract=off: one binary must give the

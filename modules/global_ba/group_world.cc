@@ -140,7 +140,7 @@ class Maker {
 };
 
 // Removes the observations of landmarks that no moving keyframe sees: they have no effect.
-void DropWhatIsHeld(BaWorld* world) {
+void DropWhatIsFixed(BaWorld* world) {
   std::vector<bool> moves(world->landmarks.size(), false);
   for (const BaObservation& seen : world->observations) {
     moves[seen.landmark] = moves[seen.landmark] || !world->keyframes[seen.keyframe].fixed;
@@ -171,7 +171,7 @@ BaWorld MakeLocalWorld(const MapPoses& state, const LocalPart& part, const Adjus
   }
   maker.StartFrom(adjusted, state, part);
   BaWorld world = maker.Finish(pairs);
-  DropWhatIsHeld(&world);
+  DropWhatIsFixed(&world);
   return world;
 }
 

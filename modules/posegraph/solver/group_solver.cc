@@ -62,7 +62,7 @@ Matrix4d InverseBlock(const SparseFactor& factor, const Eigen::VectorXd& D, int 
   return block;
 }
 
-// What is known of a node that nothing holds: these sigmas (m, m, m, rad).
+// Sigmas of a node that no loop in force connects to a fixed one (m, m, m, rad).
 const Vector4d kUnknownSigmas(100, 100, 100, 3.2);
 
 bool IsKnown(const Matrix4d& covariance) {
@@ -255,7 +255,7 @@ std::vector<Matrix4d> GroupSolver::Marginals(const std::vector<int>& nodes) cons
   for (const int node : nodes) {
     columns.push_back(column[node]);
   }
-  // Singular if the loops that hold a map are all switched off.
+  // Singular if all loops of a map are switched off.
   if (!InverseBlocks(H, columns, &marginals)) {
     InverseBlocks(WithPriors(H, num_nodes), columns, &marginals);
   }

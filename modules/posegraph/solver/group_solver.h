@@ -52,7 +52,7 @@ class GroupSolver {
 
   // Covariances of (p, yaw) of some nodes: 4x4 diagonal blocks of the inverse of J^T J, from one
   // sparse factorisation; per node only the needed part of the triangular solve is done. Zero for a
-  // fixed node; sigmas of about 100 m and pi for a node that no loop in force holds.
+  // fixed node; sigmas of about 100 m and pi if no loop in force connects it to one.
   std::vector<Matrix4d> Marginals(const std::vector<int>& nodes) const;
 
  private:

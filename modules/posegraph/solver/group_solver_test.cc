@@ -33,7 +33,7 @@ TEST(GroupSolver, MarginalsOfAClosedChain) {
 }
 
 // With its only loop switched off, nothing says where the second chain is.
-TEST(GroupSolver, MarginalsOfAChainThatNothingHolds) {
+TEST(GroupSolver, MarginalsOfAChainWithoutALoopInForce) {
   Relative4 same_place;
   same_place.covariance = 1e-2 * Matrix4d::Identity();
   Relative4 far = same_place;

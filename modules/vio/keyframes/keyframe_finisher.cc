@@ -6,8 +6,8 @@
 #include <cmath>
 #include <utility>
 
-#include "vio/window/landmark_factor.h"
-#include "vio/window/point_geometry.h"
+#include "vio/window/landmarks/landmark_factor.h"
+#include "vio/window/landmarks/point_geometry.h"
 #include "vio/window/window_solver.h"
 
 namespace pangea::vio {

@@ -10,7 +10,7 @@
 
 #include "core/camera_model.h"
 #include "vio/front_end/tracks.h"
-#include "vio/window/point_geometry.h"
+#include "vio/window/landmarks/point_geometry.h"
 #include "vio/window/window_state.h"
 
 namespace pangea::vio {

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "vio/window/landmark_factor.h"
+#include "vio/window/landmarks/landmark_factor.h"
 #include "vio/window/nine_columns.h"
 
 namespace pangea::vio {

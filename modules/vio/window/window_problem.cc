@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "core/least_squares/levenberg_marquardt.h"
-#include "vio/window/landmark_factor.h"
+#include "vio/window/landmarks/landmark_factor.h"
 #include "vio/window/window_factors.h"
 #include "vio/window/window_solver.h"
 

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "core/imu/imu_factor.h"
-#include "vio/window/point_geometry.h"
+#include "vio/window/landmarks/point_geometry.h"
 #include "vio/window/window_state.h"
 
 namespace pangea::vio {

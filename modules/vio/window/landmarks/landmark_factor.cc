@@ -1,4 +1,4 @@
-#include "vio/window/landmark_factor.h"
+#include "vio/window/landmarks/landmark_factor.h"
 
 #include <Eigen/LU>
 #include <algorithm>

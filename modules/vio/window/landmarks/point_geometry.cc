@@ -1,4 +1,4 @@
-#include "vio/window/point_geometry.h"
+#include "vio/window/landmarks/point_geometry.h"
 
 #include <Eigen/Cholesky>
 #include <cmath>

@@ -1,5 +1,5 @@
-#include "vio/window/point_geometry.h"
-#include "vio/window/landmark_factor.h"
+#include "vio/window/landmarks/point_geometry.h"
+#include "vio/window/landmarks/landmark_factor.h"
 
 #include <gtest/gtest.h>
 

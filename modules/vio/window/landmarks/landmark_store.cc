@@ -1,4 +1,4 @@
-#include "vio/window/landmark_store.h"
+#include "vio/window/landmarks/landmark_store.h"
 
 #include <utility>
 

@@ -1,9 +1,9 @@
-#include "vio/window/landmark_check.h"
+#include "vio/window/landmarks/landmark_check.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "vio/window/landmark_factor.h"
+#include "vio/window/landmarks/landmark_factor.h"
 
 namespace pangea::vio {
 namespace {
