@@ -160,6 +160,15 @@ std::optional<RefinedStart> Refine(std::span<const StartFrame> frames, const Rig
   return out;
 }
 
+std::optional<RefinedStart> RefineInFront(const RefineFrom& refine, LinearStart* start) {
+  std::optional<RefinedStart> refined = refine(*start);
+  if (refined && refined->inlier_share < 1 - kMinInlierShare) {
+    *start = Scaled(std::move(*start), -1);
+    refined = refine(*start);
+  }
+  return refined;
+}
+
 RefinedStart BestOfScales(const RefineFrom& refine, const LinearStart& start, RefinedStart first) {
   RefinedStart best = std::move(first);
   for (const double scale : kOtherScales) {

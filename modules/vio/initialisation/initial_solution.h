@@ -79,10 +79,15 @@ std::optional<RefinedStart> Refine(std::span<const StartFrame> frames, const Rig
                                    const LinearStart& start, const StartSigmas& sigmas);
 
 // The closed form has no accelerometer bias. If the body hardly moves, the bias makes the scale
-// several times too large or too small, and the refinement ends in a local minimum. So this refines
-// from other scales too and returns the result with the lowest cost. `first`: the result refined
-// from `start` itself.
+// several times too large or too small, or even negative.
 using RefineFrom = std::function<std::optional<RefinedStart>(const LinearStart&)>;
+
+// Refines the start. With a negative scale all points are behind the cameras: then `start` is
+// replaced by its mirror image, and that is refined.
+std::optional<RefinedStart> RefineInFront(const RefineFrom& refine, LinearStart* start);
+
+// At a wrong scale the refinement ends in a local minimum. So this refines from other scales too
+// and returns the result with the lowest cost. `first`: the result refined from `start` itself.
 RefinedStart BestOfScales(const RefineFrom& refine, const LinearStart& start, RefinedStart first);
 
 }  // namespace pangea::vio

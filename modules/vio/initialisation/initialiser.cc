@@ -263,7 +263,7 @@ InitialResult Initialiser::TryMoving(const std::vector<StartFrame>& frames) cons
   if (!gyro_bias) {
     return {std::nullopt, "too few features are tracked from image to image"};
   }
-  const auto linear = SolveLinear(frames, camera_.T_body_cam, noise_, *gyro_bias);
+  auto linear = SolveLinear(frames, camera_.T_body_cam, noise_, *gyro_bias);
   if (!linear) {
     return {std::nullopt, "the motion does not determine velocity and gravity yet"};
   }
@@ -271,7 +271,7 @@ InitialResult Initialiser::TryMoving(const std::vector<StartFrame>& frames) cons
   const auto refine = [&](const LinearStart& start) {
     return Refine(frames, camera_.T_body_cam, noise, *gyro_bias, start, sigmas_);
   };
-  std::optional<RefinedStart> refined = refine(*linear);
+  std::optional<RefinedStart> refined = RefineInFront(refine, &*linear);
   if (auto refusal = Refusal(refined)) {
     return *refusal;
   }

@@ -283,14 +283,19 @@ Rigid3 Gentle(double t) {
   return {T.q, 0.1 * T.t};
 }
 
-// With a large bias and little motion the closed-form scale is several times too large.
-TEST(Refine, AMinimumOfAnotherScaleIsNotTaken) {
+StartWorld GentleWithBias(const Vector3d& bias) {
   StartWorld world = Record(Gentle, 0, kRaySigma);
   for (StartFrame& frame : world.frames) {
     for (ImuSample& sample : frame.imu) {
-      sample.accel += Vector3d(0.3, -0.3, 0.2);
+      sample.accel += bias;
     }
   }
+  return world;
+}
+
+// With a large bias and little motion the closed-form scale is several times too large.
+TEST(Refine, AMinimumOfAnotherScaleIsNotTaken) {
+  const StartWorld world = GentleWithBias({0.3, -0.3, 0.2});
   const auto start = SolveLinear(world.frames, kT_body_cam, ImuNoise{}, kGyroBias);
   ASSERT_TRUE(start);
   const LinearStart too_large = Scaled(*start, 2.5);
@@ -304,6 +309,23 @@ TEST(Refine, AMinimumOfAnotherScaleIsNotTaken) {
   EXPECT_GT(first->states.back().v_odom_body.norm(), 3 * truth);
   const RefinedStart best = BestOfScales(refine, too_large, *first);
   EXPECT_NEAR(best.states.back().v_odom_body.norm(), truth, 4 * best.velocity_sigma);
+}
+
+TEST(Refine, AStartWithANegativeScaleIsMirrored) {
+  const StartWorld world = GentleWithBias({0, 0, -0.15});
+  auto start = SolveLinear(world.frames, kT_body_cam, ImuNoise{}, kGyroBias);
+  ASSERT_TRUE(start);
+  const auto refine = [&](const LinearStart& from) {
+    return Refine(world.frames, kT_body_cam, ImuNoise{}, kGyroBias, from, kSigmas);
+  };
+  const auto direct = refine(*start);
+  ASSERT_TRUE(direct);
+  ASSERT_EQ(direct->inlier_share, 0);
+  const auto mirrored = RefineInFront(refine, &*start);
+  ASSERT_TRUE(mirrored && !mirrored->states.empty());
+  EXPECT_GT(mirrored->inlier_share, 0.99);
+  EXPECT_NEAR(mirrored->states.back().v_odom_body.norm(), VelocityAt(Gentle, 3).norm(),
+              4 * mirrored->velocity_sigma);
 }
 
 }  // namespace
