@@ -114,6 +114,20 @@ TEST(Log, WhatIsNoLogIsNoEmptyLog) {
 }
 
 // The output may be the result that the user needs, so its loss is an error.
+TEST(Log, WhatIsReadIsNotOverwritten) {
+  const fs::path log = FreshFolder("overwrite") / "session.lcm";
+  fs::copy_file(kSample, log);
+  const std::string name = log.string();
+  for (const std::string& command :
+       {"export " + name + " --g2o " + name, "export " + name + " --ply " + name,
+        "explain " + name + " --constraint 1 --out " + name}) {
+    const Outcome outcome = RunCommand("pangea-log " + command);
+    EXPECT_EQ(outcome.exit_code, 1) << command;
+    EXPECT_THAT(outcome.output, HasSubstr("is the log that is read")) << command;
+    EXPECT_EQ(fs::file_size(log), fs::file_size(kSample)) << command;
+  }
+}
+
 TEST(Output, AFullDiskIsSaid) {
   const std::string log = PANGEA_SOURCE_DIR "/logs/two_walks/session.lcm";
   for (const std::string& command : {"pangea-log info " + log, "pangea-log list --json " + log}) {

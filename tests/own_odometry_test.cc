@@ -69,7 +69,26 @@ TEST(OwnOdometry, FusesWithAnAgentOfVio) {
                        path("holed.tum") + " --out-keyframes " + path("maps.lcm") +
                        " && pangea-log list " + path("maps.lcm") +
                        " --fields | grep -o 'opened_utime = [0-9]*' | sort -u | wc -l");
-  EXPECT_NE(outcome.output.find("keyframes\n2\n"), std::string::npos) << outcome.output;
+  EXPECT_NE(outcome.output.find("keyframes in 2 maps\n2\n"), std::string::npos) << outcome.output;
+
+  // Quaternions with w first, and poses in millimetres.
+  Trajectory w_first = ReadTrajectory(path("poses.tum"), &warnings), in_mm = w_first;
+  for (StampedPose& pose : w_first) {
+    pose.T.q = Eigen::Quaterniond(pose.T.q.z(), pose.T.q.w(), pose.T.q.x(), pose.T.q.y());
+  }
+  WriteTum(path("w_first.tum"), w_first);
+  for (StampedPose& pose : in_mm) {
+    pose.T.t *= 1000;
+  }
+  WriteTum(path("in_mm.tum"), in_mm);
+  const std::string example =
+      "pangea-own-odometry-example --agent 2 --recording " + walk_2 + " --poses ";
+  outcome = RunCommand(example + path("w_first.tum"));
+  EXPECT_NE(outcome.output.find("keyframes have no map points"), std::string::npos)
+      << outcome.output;
+  outcome = RunCommand(example + path("in_mm.tum"));
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_NE(outcome.output.find("they must be in metres"), std::string::npos) << outcome.output;
 
   outcome = RunCommand("pangea-own-odometry-example --agent 2 --recording " + walk_1 + " --poses " +
                        path("out/agent_1.tum") + " --out-keyframes " + path("no/such/folder.lcm"));

@@ -53,7 +53,7 @@ Outcome* ReplayDebugging::whole_ = nullptr;
 // together.
 TEST_F(ReplayDebugging, EachProcessAloneRepeatsItself) {
   for (const char* process : {"place_recognition", "inter_map_ba", "fusion", "posegraph",
-                              "global_ba", "posegraph,global_ba"}) {
+                              "global_ba", "posegraph,global_ba", "fusion,global_ba"}) {
     const Outcome alone = Replay(Log("whole"), process, std::string("--only ") + process);
     EXPECT_EQ(alone.exit_code, 0) << process << "\n" << alone.output;
     EXPECT_THAT(alone.output, HasSubstr("no message differs"));

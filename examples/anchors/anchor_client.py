@@ -53,6 +53,7 @@ def main():
     parser.add_argument("--name", default="example")
     parser.add_argument("--position", type=float, nargs=3, default=(0, 0, 0), help="metres in the map frame")
     arguments = parser.parse_args()
+    arguments.server = arguments.server.rstrip("/")
 
     pose = {"group": group_of(arguments.server, arguments.agent), "position": list(arguments.position)}
     anchor = call(f"{arguments.server}/v1/anchors", "POST", {"name": arguments.name, "pose": pose})

@@ -25,22 +25,26 @@ struct Arguments {
   std::string recording, poses, bus, out_keyframes;
 };
 
+struct Counts {
+  int poses = 0, maps = 0, keyframes = 0;
+  int without_points = 0;  // of the keyframes
+};
+
 // Plays as fast as the server keeps up. A live odometry calls AddImage from its camera's callback
 // instead.
-void Play(const Arguments& arguments) {
-  const EurocRecording recording(arguments.recording);
-  std::vector<std::string> warnings;
-  const Trajectory poses = ReadTrajectory(arguments.poses, &warnings);
-  for (const std::string& warning : warnings) {
-    std::cerr << fmt::format("warning: {}\n", warning);
-  }
+Counts Play(const Arguments& arguments, const EurocRecording& recording, const Trajectory& poses) {
   LocalBus nobody;
   std::optional<LcmBus> bus;
   if (!arguments.bus.empty()) {
     bus.emplace(arguments.bus);
   }
+  Counts counts;
+  const auto open_map = [&counts] {
+    ++counts.maps;
+    return WallUtime();
+  };
   ExternalOdometryProcess process(bus ? static_cast<Bus&>(*bus) : nobody, arguments.agent_id,
-                                  recording.camera(), WallUtime, WallUtime());
+                                  recording.camera(), open_map, WallUtime());
   std::optional<PlaybackPace> pace;
   if (bus) {
     pace.emplace(&*bus, process, process.publisher());
@@ -49,16 +53,15 @@ void Play(const Arguments& arguments) {
   if (!arguments.out_keyframes.empty()) {
     log.emplace(arguments.out_keyframes);
   }
-  int keyframes = 0;
   for (size_t i = 0; i < recording.images().size() && !StopRequested(); ++i) {
-    constexpr int64_t kMaxGap_us = 200'000;
     const int64_t utime = recording.images()[i].utime;
-    const auto T_odom_body = Interpolate(poses, utime, kMaxGap_us);
+    const auto T_odom_body = Interpolate(poses, utime, ExternalOdometryProcess::kMaxLost_us);
     if (!T_odom_body) {  // the odometry is lost; if it stays so, its next pose begins a new map
       process.AddImage(utime, cv::Mat(), std::nullopt);
       nobody.Drain();
       continue;
     }
+    ++counts.poses;
     std::string why;
     const cv::Mat image = recording.LoadImage(i, &why);
     if (image.empty()) {
@@ -66,7 +69,8 @@ void Play(const Arguments& arguments) {
       continue;
     }
     if (const auto keyframe = process.AddImage(utime, image, T_odom_body)) {
-      ++keyframes;
+      ++counts.keyframes;
+      counts.without_points += keyframe->points.empty() ? 1 : 0;
       if (log) {
         log->Write(utime, channels::Keyframe(arguments.agent_id),
                    EncodeMessage(ToMessage(*keyframe)));
@@ -80,13 +84,47 @@ void Play(const Arguments& arguments) {
   if (pace) {
     pace->WaitAtTheEnd();
   }
-  if (keyframes == 0) {
+  if (const int64_t missing = bus ? process.publisher().Unacknowledged() : 0; missing > 0) {
     throw std::runtime_error(
-        fmt::format("--poses {}: none lies within 0.2 s of an image of {}; their times must be "
-                    "the images', in seconds (TUM) or nanoseconds (EuRoC)",
-                    arguments.poses, arguments.recording));
+        fmt::format("{} of {} keyframes were not acknowledged: does pangea-uplink run on {}?",
+                    missing, counts.keyframes, arguments.bus));
   }
-  std::cout << fmt::format("agent {}: {} keyframes\n", arguments.agent_id, keyframes);
+  return counts;
+}
+
+// Poses of other units, axes or times still make an agent, but one that never fuses.
+void Tell(const Counts& counts, const Arguments& arguments, const EurocRecording& recording) {
+  if (counts.poses == 0) {
+    throw std::runtime_error(fmt::format(
+        "--poses {}: none lies within {:g} s of an image of {}; their times must be "
+        "the images', in seconds (TUM) or nanoseconds (EuRoC)",
+        arguments.poses, 1e-6 * ExternalOdometryProcess::kMaxLost_us, arguments.recording));
+  }
+  if (counts.keyframes == 0) {
+    throw std::runtime_error(
+        fmt::format("--poses {}: no keyframe from {} poses in {} maps, as each jump begins a new "
+                    "map; they must be in metres",
+                    arguments.poses, counts.poses, counts.maps));
+  }
+  std::cout << fmt::format("agent {}: {} of {} images have a pose; {} keyframes in {} maps\n",
+                           arguments.agent_id, counts.poses, recording.images().size(),
+                           counts.keyframes, counts.maps);
+  if (2 * counts.without_points > counts.keyframes) {
+    std::cerr << fmt::format(
+        "warning: {} of {} keyframes have no map points: are the poses T_odom_body, with the "
+        "quaternion as x y z w, at the images' times?\n",
+        counts.without_points, counts.keyframes);
+  }
+}
+
+void Run(const Arguments& arguments) {
+  const EurocRecording recording(arguments.recording);
+  std::vector<std::string> warnings;
+  const Trajectory poses = ReadTrajectory(arguments.poses, &warnings);
+  for (const std::string& warning : warnings) {
+    std::cerr << fmt::format("warning: {}\n", warning);
+  }
+  Tell(Play(arguments, recording, poses), arguments, recording);
 }
 
 }  // namespace
@@ -108,7 +146,7 @@ int main(int argc, char** argv) {
   CLI11_PARSE(app, argc, argv);
   try {
     pangea::InstallSignalHandlers();
-    pangea::example::Play(arguments);
+    pangea::example::Run(arguments);
     return 0;
   } catch (const std::exception& error) {
     return pangea::Failed("pangea-own-odometry-example", error);

@@ -35,8 +35,18 @@ struct Arguments {
   LogReadings readings;  // damage in the logs that were read
 };
 
+// An output that is written again is usual; the log itself would be lost.
+void CheckIsNotTheLog(const std::string& out, const std::string& log) {
+  std::error_code is_not_there;
+  if (!out.empty() && std::filesystem::equivalent(out, log, is_not_there)) {
+    throw std::runtime_error(fmt::format("{}: is the log that is read; give another name", out));
+  }
+}
+
 void Export(Arguments& arguments) {
   const std::string& log = arguments.logs.front();
+  CheckIsNotTheLog(arguments.ply, log);
+  CheckIsNotTheLog(arguments.g2o, log);
   if (arguments.tum.empty() && arguments.g2o.empty() && arguments.ply.empty()) {
     throw std::runtime_error("export: say what, one or more of --tum, --g2o, --ply");
   }
@@ -64,6 +74,7 @@ void Export(Arguments& arguments) {
 
 void ExplainResult(Arguments& arguments) {
   const std::string& log = arguments.logs.front();
+  CheckIsNotTheLog(arguments.out, log);
   if (!arguments.constraint) {
     std::cout << ListResults(log, &arguments.readings);
     return;
@@ -84,6 +95,7 @@ void ListAnchors(Arguments& arguments) {
     std::cout << ToText(logged, log);
     return;
   }
+  CheckIsNotTheLog(arguments.out, log);
   if (arguments.out.ends_with(".json")) {
     WriteTextFile(arguments.out, ToJson(logged));
   } else {
@@ -237,7 +249,8 @@ void AddExplain(CLI::App& app, Arguments* arguments) {
       app, "explain", "Why a constraint was accepted or refused; without --constraint, all of them",
       arguments, 1);
   explain->add_option("--constraint", arguments->constraint, "Its id");
-  explain->add_option("--out", arguments->out, "Picture (PNG) of both keyframes at each step");
+  explain->add_option("--out", arguments->out, "Picture (PNG) of both keyframes at each step")
+      ->needs("--constraint");
   explain->add_option("--recording", arguments->recordings,
                       "ID=FOLDER: an agent's recording, for its images (default: as the session "
                       "remembers it beside its log)");

@@ -4,9 +4,11 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <deque>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <regex>
 #include <stdexcept>
@@ -34,10 +36,12 @@ void ReadCut(const std::string& log, const LogCut& cut, LogReadings* readings,
              WhileReading while_reading, Handler handler) {
   const std::regex channels = Expression(cut.channels);
   std::optional<int64_t> first;
+  int64_t latest = std::numeric_limits<int64_t>::min();
   const auto read = [&](const LogEvent& event) {
     first = first.value_or(event.utime);
-    // Capture times may decrease slightly, even below the first one.
-    const double seconds = std::max(0.0, 1e-6 * static_cast<double>(event.utime - *first));
+    // Capture times may decrease: slightly, or because the clock was set. A replay does the same.
+    latest = std::max(latest, event.utime);
+    const double seconds = 1e-6 * static_cast<double>(latest - *first);
     if (seconds >= cut.from_s && seconds < cut.to_s && std::regex_match(event.channel, channels)) {
       handler(event, seconds);
     }
@@ -46,9 +50,10 @@ void ReadCut(const std::string& log, const LogCut& cut, LogReadings* readings,
 }
 
 [[noreturn]] void ThrowEmpty(const std::string& log, const LogCut& cut) {
-  throw std::runtime_error(fmt::format(
-      "{}: no event of {} from {:g} to {:g} s; pangea-log info shows channels and times", log,
-      cut.channels, cut.from_s, cut.to_s));
+  const std::string end = std::isfinite(cut.to_s) ? fmt::format("{:g} s", cut.to_s) : "the end";
+  throw std::runtime_error(
+      fmt::format("{}: no event of {} from {:g} s to {}; pangea-log info shows channels and times",
+                  log, cut.channels, cut.from_s, end));
 }
 
 // Whether a path has an array index of eight or more, such as "a.b[12].c[3]".

@@ -188,11 +188,25 @@ TEST_F(LogToolsTest, ANewLogGetsItsNameWhenItIsComplete) {
 TEST_F(LogToolsTest, AListWithoutAnEventIsRefusedAsACutIs) {
   std::ostringstream out;
   EXPECT_THAT([&] { ListEvents(kSample, {.channels = "NOPE"}, ListAs::kLines, out); },
-              testing::ThrowsMessage<std::runtime_error>(
-                  testing::HasSubstr("session.lcm: no event of NOPE from 0 to inf s; pangea-log")));
+              testing::ThrowsMessage<std::runtime_error>(testing::HasSubstr(
+                  "session.lcm: no event of NOPE from 0 s to the end; pangea-log")));
   EXPECT_EQ(out.str(), "");
   ListEvents(kSample, {.to_s = 1}, ListAs::kLines, out);
   EXPECT_NE(out.str(), "");
+}
+
+// The clock was set back, as at the start of a phone: later events keep the latest time.
+TEST_F(LogToolsTest, TimesOfAListDoNotGoBack) {
+  NewLog log(Path("back.lcm"));
+  for (const int64_t utime : {1'000'000, 4'000'000, 2'000'000, 5'000'000}) {
+    log.Write(utime, fmt::format("AT_{}", utime), std::vector<uint8_t>{1});
+  }
+  log.Keep();
+  std::ostringstream out;
+  ListEvents(Path("back.lcm"), {.from_s = 3}, ListAs::kLines, out);
+  EXPECT_THAT(out.str(), testing::AllOf(testing::HasSubstr("  3.000000  AT_4000000"),
+                                        testing::HasSubstr("  3.000000  AT_2000000"),
+                                        testing::HasSubstr("  4.000000  AT_5000000")));
 }
 
 TEST_F(LogToolsTest, ARecordingIsOfAnAgentOfTheLog) {

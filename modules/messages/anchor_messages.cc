@@ -12,7 +12,6 @@ using namespace messages_checks;
 namespace {
 
 constexpr int kMaxShown = 256;
-constexpr int64_t kMaxUtime = 1LL << 60;
 constexpr int64_t kMaxRevision = 1LL << 60;
 constexpr double kMaxPixel = 1e5;
 

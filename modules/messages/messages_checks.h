@@ -5,6 +5,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <cmath>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <utility>
@@ -24,6 +25,9 @@ Parsed<T> Refused(std::string reason) {
 }
 
 inline Eigen::Vector3d ToVector(const vector3_t& v) { return {v.x, v.y, v.z}; }
+
+// Of every time, in microseconds: a time in nanoseconds is beyond it.
+inline constexpr int64_t kMaxUtime = int64_t{1} << 60;
 
 inline bool Bounded(const Eigen::Vector3d& v, double limit) {
   return v.allFinite() && v.cwiseAbs().maxCoeff() <= limit;

@@ -226,8 +226,8 @@ Parsed<Keyframe> Parse(const KeyframeMessage& m) {
   keyframe.gyro_bias = ToVector(m.gyro_bias);
   keyframe.accel_bias = ToVector(m.accel_bias);
   keyframe.group_revision = m.group_revision;
-  if (m.utime < 0) {
-    return Refused<Keyframe>("negative time");
+  if (m.utime < 0 || m.utime > kMaxUtime) {
+    return Refused<Keyframe>("time out of range: is it in microseconds?");
   }
   if (!Bounded(keyframe.v_odom_body, 1000) || !Bounded(keyframe.gyro_bias, 10) ||
       !Bounded(keyframe.accel_bias, 100)) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <lcm/lcm-cpp.hpp>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -182,24 +183,28 @@ std::string Speaker(const LogEvent& event) {
 }
 
 // Reads the messages about maps; without HAVE messages, requests and retransmissions.
-std::vector<LoggedMessage> ReadMessages(const std::set<std::string>& processes, const fs::path& log,
-                                        double until_s, LogReadings* readings) {
+struct LoggedMessages {
+  std::optional<int64_t> begin_utime;  // of the log's first event
   std::vector<LoggedMessage> messages;
-  std::optional<int64_t> begin;
+};
+
+LoggedMessages ReadMessages(const std::set<std::string>& processes, const fs::path& log,
+                            double until_s, LogReadings* readings) {
+  LoggedMessages read;
   const auto take = [&](const LogEvent& event) {
-    begin = begin.value_or(event.utime);
-    const double elapsed_s = 1e-6 * static_cast<double>(event.utime - *begin);
+    read.begin_utime = read.begin_utime.value_or(event.utime);
+    const double elapsed_s = 1e-6 * static_cast<double>(event.utime - *read.begin_utime);
     const std::string speaker = Speaker(event);
     if ((!speaker.empty() || IsFromAgents(event.channel)) && elapsed_s <= until_s) {
-      messages.push_back({event.utime,
-                          elapsed_s,
-                          event.channel,
-                          {event.data.begin(), event.data.end()},
-                          processes.contains(speaker)});
+      read.messages.push_back({event.utime,
+                               elapsed_s,
+                               event.channel,
+                               {event.data.begin(), event.data.end()},
+                               processes.contains(speaker)});
     }
   };
   ReadLog(log.string(), take, readings);
-  return messages;
+  return read;
 }
 
 // The messages before the first keyframe that is later than `checkpoint_s`: so the messages about a
@@ -260,6 +265,23 @@ DerivedConstraints ReadDerived(const std::vector<fs::path>& logs, LogReadings* r
   return derived;
 }
 
+// Two logs with one map are a log and its copy, or a session's log and its journal: their keyframes
+// would come twice.
+void CheckMapsAreDistinct(const std::vector<fs::path>& logs,
+                          const std::vector<std::vector<LoggedKeyframe>>& by_log) {
+  std::map<MapId, size_t> log_of_map;
+  for (size_t i = 0; i < logs.size(); ++i) {
+    for (const LoggedKeyframe& keyframe : by_log[i]) {
+      const size_t first = log_of_map.try_emplace(keyframe.id.map, i).first->second;
+      if (first != i) {
+        throw std::runtime_error(fmt::format("{} and {} both have the map {}: give one of them",
+                                             logs[first].string(), logs[i].string(),
+                                             ToString(keyframe.id.map)));
+      }
+    }
+  }
+}
+
 }  // namespace
 
 ReplaySummary Replay(const std::vector<fs::path>& logs, const ServerOptions& options,
@@ -272,6 +294,7 @@ ReplaySummary Replay(const std::vector<fs::path>& logs, const ServerOptions& opt
     by_log.push_back(ReadKeyframeLog(log, readings));
     Merge(ReadAnchorEdits(log, readings), &edits);
   }
+  CheckMapsAreDistinct(logs, by_log);
   DerivedConstraints derived = ReadDerived(logs, readings);
   std::vector<LoggedKeyframe> keyframes = Interleave(std::move(by_log));
   const int64_t begin_utime = keyframes.front().captured_utime - keyframes.front().elapsed_us;
@@ -279,6 +302,7 @@ ReplaySummary Replay(const std::vector<fs::path>& logs, const ServerOptions& opt
 
   LocalBus bus;
   Recorder recorder(bus, options, out_log);
+  recorder.SetTime(begin_utime);
   Server server(bus, options, {std::begin(kReplayed), std::end(kReplayed)});
   ReplaySummary summary;
   int64_t next_edit = 0;  // for several logs, edits are renumbered
@@ -310,7 +334,7 @@ int64_t ReplayPart(const fs::path& log, const ReplayedPart& part, const fs::path
                    Progress& progress, LogReadings* readings) {
   UseOneThread();
   ReadKeyframeLog(log, readings);  // throws if keyframes are missing
-  std::vector<LoggedMessage> messages = ReadMessages(part.processes, log, part.until_s, readings);
+  auto [begin_utime, messages] = ReadMessages(part.processes, log, part.until_s, readings);
   LocalBus bus;
   Server server(bus, part.options, part.processes);
   int64_t taken_over = 0;
@@ -330,6 +354,7 @@ int64_t ReplayPart(const fs::path& log, const ReplayedPart& part, const fs::path
     --after_input;
   }
   Recorder recorder(bus, part.options, out_log);
+  recorder.SetTime(*begin_utime);
   bool finished = false;
   for (size_t i = 0; i < messages.size(); ++i) {
     recorder.SetTime(messages[i].utime);
@@ -337,9 +362,9 @@ int64_t ReplayPart(const fs::path& log, const ReplayedPart& part, const fs::path
     if (!messages[i].own) {
       bus.Publish(messages[i].channel, messages[i].data);
       bus.Drain();
-    } else if (i >= after_input && !finished) {
+    } else if (i >= after_input && !finished && !IsMatchOrResult(messages[i].channel)) {
       // The process sent this message, although no input is left: it worked because the bus was
-      // quiet.
+      // quiet. (A match or a result may only have taken its time.)
       server.Finish();
       finished = true;
     }

@@ -52,6 +52,45 @@ TEST(Replay, TellsHowFarItIs) {
   std::filesystem::remove(log + ".part");
 }
 
+// A server that started long before its agents: times are since the log's first event.
+TEST(Replay, BeginsAtTheLogsFirstEvent) {
+  constexpr int64_t kEarlier_us = 100'000'000;
+  const std::string late = testing::TempDir() + "replay_late.lcm", out = late + ".out";
+  {
+    LogFileWriter log(late);
+    LogReader sample(kSample.string());
+    const LogEvent* event = sample.Next();
+    log.Write(event->utime - kEarlier_us, "SOMETHING", std::vector<uint8_t>{1});
+    for (; event != nullptr; event = sample.Next()) {
+      log.Write(event->utime, event->channel, event->data);
+    }
+  }
+  Progress progress("replay");
+  Replay({late}, {}, 1e-6 * kEarlier_us + kUntil_s, out, progress);
+  LogReader replayed(out);
+  const int64_t begin_utime = replayed.Next()->utime;
+  const LogEvent* event = replayed.Next();
+  while (event != nullptr && event->channel != "KEYFRAME_1") {
+    event = replayed.Next();
+  }
+  ASSERT_NE(event, nullptr);
+  EXPECT_GE(event->utime - begin_utime, kEarlier_us);
+  std::filesystem::remove(late);
+  std::filesystem::remove(out);
+}
+
+TEST(Replay, AMapInTwoLogsIsRefused) {
+  const std::string copy = testing::TempDir() + "replay_copy.lcm", out = copy + ".out";
+  std::filesystem::copy_file(kSample, copy, std::filesystem::copy_options::overwrite_existing);
+  Progress progress("replay");
+  EXPECT_THAT(
+      [&] {
+        Replay({kSample, copy}, {}, kUntil_s, out, progress);
+      },
+      testing::ThrowsMessage<std::runtime_error>(HasSubstr("replay_copy.lcm both have")));
+  std::filesystem::remove(copy);
+}
+
 // The sample's first seconds, with an anchor that agent 1 placed after one of its keyframes.
 class ReplayOfAnchors : public testing::Test {
  protected:

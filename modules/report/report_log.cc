@@ -115,27 +115,28 @@ void Finish(const Frames& frames, PoseTrack* track) {
   }
 }
 
-bool AddKeyframe(Bytes data, double session_s, CapturedSession* session) {
-  const auto keyframe = ParseMessage<KeyframeMessage>(data);
+// These return why a message is refused; empty: it is taken.
+std::string AddKeyframe(Bytes data, double session_s, CapturedSession* session) {
+  auto keyframe = ParseMessage<KeyframeMessage>(data);
   if (keyframe.value) {
     session->keyframes.emplace(keyframe.value->id, Captured(*keyframe.value, session_s));
     session->cameras.insert_or_assign(keyframe.value->id.map.agent_id, keyframe.value->camera);
   }
-  return keyframe.value.has_value();
+  return std::move(keyframe.refused);
 }
 
-bool AddConstraint(Bytes data, CapturedSession* session) {
-  const auto constraint = ParseMessage<constraint_t>(data);
+std::string AddConstraint(Bytes data, CapturedSession* session) {
+  auto constraint = ParseMessage<constraint_t>(data);
   if (constraint.value) {
     session->constraints.insert_or_assign(constraint.value->Id(), *constraint.value);
   }
-  return constraint.value.has_value();
+  return std::move(constraint.refused);
 }
 
-bool AddAnchorEdit(Bytes data, CapturedSession* session) {
+std::string AddAnchorEdit(Bytes data, CapturedSession* session) {
   auto edit = ParseMessage<anchor_edit_t>(data);
   if (!edit.value) {
-    return false;
+    return std::move(edit.refused);
   }
   std::vector<AnchorEdit>& edits = session->anchor_edits[edit.value->anchor];
   const bool known = std::ranges::any_of(edits, [&edit](const AnchorEdit& other) {
@@ -144,27 +145,27 @@ bool AddAnchorEdit(Bytes data, CapturedSession* session) {
   if (!known) {
     edits.push_back(std::move(*edit.value));
   }
-  return true;
+  return "";
 }
 
-bool AddAnchor(Bytes data, CapturedSession* session) {
-  const auto state = ParseMessage<anchor_t>(data);
+std::string AddAnchor(Bytes data, CapturedSession* session) {
+  auto state = ParseMessage<anchor_t>(data);
   if (state.value && !state.value->gone) {
     session->anchors_placed.insert(state.value->anchor);
   }
-  return state.value.has_value();
+  return std::move(state.refused);
 }
 
-bool AddState(Bytes data, double session_s, States* states) {
+std::string AddState(Bytes data, double session_s, States* states) {
   map_state_t message{};
   if (!DecodeMessage(data, &message)) {
-    return false;
+    return "map_state_t does not decode";
   }
   auto state = Parse(message);
   if (state.value) {
     states->AddChunk(message, std::move(*state.value), session_s);
   }
-  return state.value.has_value();
+  return std::move(state.refused);
 }
 
 void AddSample(const status_t& status, int64_t utime, ProcessSamples* samples) {
@@ -172,14 +173,14 @@ void AddSample(const status_t& status, int64_t utime, ProcessSamples* samples) {
       {utime, status.cpu_s, CounterOf(status, "bytes_up"), CounterOf(status, "bytes_down")});
 }
 
-bool AddStatus(Bytes data, int64_t utime, CapturedSession* session) {
+std::string AddStatus(Bytes data, int64_t utime, CapturedSession* session) {
   status_t message{};
-  const bool good = DecodeMessage(data, &message);
-  if (good) {
-    AddSample(message, utime, &session->samples);
-    session->statuses.insert_or_assign(message.process, message);
+  if (!DecodeMessage(data, &message)) {
+    return "status_t does not decode";
   }
-  return good;
+  AddSample(message, utime, &session->samples);
+  session->statuses.insert_or_assign(message.process, message);
+  return "";
 }
 
 }  // namespace
@@ -192,23 +193,25 @@ CapturedSession ReadServerLog(const std::string& path, LogReadings* readings) {
     begin = begin.value_or(event.utime);
     session.begin_utime = *begin;
     const double session_s = 1e-6 * static_cast<double>(event.utime - *begin);
-    bool good = true;
+    std::string refused;
     if (channels::AgentOf(event.channel, channels::kKeyframePrefix) > 0) {
-      good = AddKeyframe(event.data, session_s, &session);
+      refused = AddKeyframe(event.data, session_s, &session);
     } else if (event.channel == channels::kConstraint) {
-      good = AddConstraint(event.data, &session);
+      refused = AddConstraint(event.data, &session);
     } else if (event.channel == channels::kMapState) {
-      good = AddState(event.data, session_s, &states);
+      refused = AddState(event.data, session_s, &states);
     } else if (event.channel == channels::kAnchorEdit) {
-      good = AddAnchorEdit(event.data, &session);
+      refused = AddAnchorEdit(event.data, &session);
     } else if (event.channel == channels::kAnchor ||
                channels::AgentOf(event.channel, channels::kAnchorPrefix) > 0) {
-      good = AddAnchor(event.data, &session);
+      refused = AddAnchor(event.data, &session);
     } else if (event.channel.starts_with(channels::kStatusPrefix)) {
-      good = AddStatus(event.data, event.utime, &session);
+      refused = AddStatus(event.data, event.utime, &session);
     }
-    if (!good) {
-      ++session.unreadable[event.channel];
+    if (!refused.empty()) {
+      RefusedMessages& of_channel =
+          session.refused.try_emplace(event.channel, RefusedMessages{0, refused}).first->second;
+      ++of_channel.count;
     }
   };
   ReadLog(path, add, readings);

@@ -72,6 +72,12 @@ struct GroupChange {
   std::map<int32_t, int64_t> newest_utime;  // by agent: of its keyframes in the group
 };
 
+// Messages that did not decode, or whose values are refused.
+struct RefusedMessages {
+  int count = 0;
+  std::string first_reason;
+};
+
 struct CapturedSession {
   int64_t begin_utime = 0;  // the log's first event, wall clock
   std::map<KeyframeId, CapturedKeyframe> keyframes;
@@ -86,8 +92,8 @@ struct CapturedSession {
   std::map<std::string, status_t> statuses;  // newest of each process
   ProcessSamples samples;
   std::map<int32_t, PoseTrack> poses;
-  std::map<std::string, int> unreadable;  // messages that did not decode or parse, by channel
-  int incomplete_states = 0;              // with a missing chunk
+  std::map<std::string, RefusedMessages> refused;  // by channel
+  int incomplete_states = 0;                       // with a missing chunk
 };
 
 // Reads KEYFRAME_*, CONSTRAINT, MAP_STATE, ANCHOR_EDIT, STATUS_* of a server bus' log. Damaged

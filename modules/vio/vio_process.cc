@@ -247,9 +247,12 @@ std::optional<std::string> VioProcess::NoPoseYet() const {
   if (num_poses_ > 0) {
     return std::nullopt;
   }
-  return num_images_ == 0 ? "no image came to the odometry"
-                          : fmt::format("the odometry did not start in {} images; at the last: {}",
-                                        num_images_, why_not_tracking_);
+  if (num_images_ == 0) {
+    return "no image came to the odometry" +
+           (why_refused_.empty() ? "" : " that could be used; the last one: " + why_refused_);
+  }
+  return fmt::format("the odometry did not start in {} images; at the last: {}", num_images_,
+                     why_not_tracking_);
 }
 
 void VioProcess::StartAnew() {
@@ -304,6 +307,7 @@ std::string VioProcess::LagText(int64_t lag_us) const {
 
 void VioProcess::RefuseImage(const std::string& why) {
   node_.Refuse("image: " + why);
+  why_refused_ = why;
   if (num_images_ == 0) {
     state_text_ = "waiting for images that can be used; the last one: " + why;
   }

@@ -117,6 +117,7 @@ class VioProcess : public Process {
   OptionsAnnouncer announcer_;
   std::optional<int64_t> first_image_utime_;
   std::string state_text_ = "waiting for images";
+  std::string why_refused_;       // the newest refused image
   std::string doubt_;             // a warning while tracking
   std::string why_not_tracking_;  // at the newest image
   SaturationDetector saturation_;

@@ -237,9 +237,9 @@ TEST_F(VioLiveTest, OneStampFarAheadDoesNotBlockTheLiveStream) {
   process.Tick(1);
   bus_.Drain();
   EXPECT_EQ(Refused("imu: far ahead of the last one"), 1);
-  EXPECT_EQ(Refused("imu: stamp out of range"), 1);
+  EXPECT_EQ(Refused("imu: stamp out of range: is it in microseconds?"), 1);
   EXPECT_EQ(Refused("image: far ahead of the last one"), 1);
-  EXPECT_EQ(Refused("image: stamp out of range"), 1);
+  EXPECT_EQ(Refused("image: stamp out of range: is it in microseconds?"), 1);
   EXPECT_EQ(Counter("started_anew"), -1);
 }
 

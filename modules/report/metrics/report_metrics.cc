@@ -249,9 +249,9 @@ ReportMetrics ComputeMetrics(const ReportInput& input, const CapturedSession& se
                              LogReadings* readings) {
   ReportMetrics metrics;
   metrics.notes = input.notes;
-  for (const auto& [channel, count] : session.unreadable) {
-    metrics.notes.push_back(
-        fmt::format("{} messages on {} could not be read; ignored", count, channel));
+  for (const auto& [channel, refused] : session.refused) {
+    metrics.notes.push_back(fmt::format("{} messages on {} are refused and ignored; the first: {}",
+                                        refused.count, channel, refused.first_reason));
   }
   if (session.incomplete_states > 0) {
     metrics.notes.push_back(

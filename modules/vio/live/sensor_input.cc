@@ -38,7 +38,7 @@ bool SensorInput::TakeStamp(StampCheck* stamps, const std::string& what, int64_t
       process_.node().Refuse(what + "far ahead of the last one");
       return false;
     case StampCheck::Decision::kOutOfRange:
-      process_.node().Refuse(what + "stamp out of range");
+      process_.node().Refuse(what + "stamp out of range: is it in microseconds?");
       return false;
   }
   return false;
@@ -66,7 +66,7 @@ void SensorInput::DropStale() {
     if (Ready()) {
       ++dropped;
     } else {
-      process_.node().Refuse("image: its inertial samples have not come within a second");
+      process_.RefuseImage("its inertial samples have not come within a second");
     }
     images_.pop_front();
   }
