@@ -13,6 +13,7 @@
 
 #include "agent_handler/agent_handler_process.h"
 #include "bus/bus.h"
+#include "uplink/edit_spool.h"
 #include "uplink/uplink_process.h"
 
 namespace pangea {

@@ -9,6 +9,7 @@
 #include "link/agent_key.h"
 #include "options/command_line.h"
 #include "options/options_arguments.h"
+#include "uplink/edit_spool.h"
 #include "uplink/uplink_process.h"
 
 namespace pangea::uplink {

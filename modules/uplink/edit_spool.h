@@ -6,8 +6,8 @@
 // There is one file for each anchor: an ordinary LCM log with its newest ANCHOR_REQUEST_k and the
 // checksum of that. A new file replaces the old one atomically, and is removed when the server has
 // answered. The page cache survives the death of the process. Put writes the file to the disk; Sync
-// makes its name survive a power cut. A damaged file is reported on stderr and renamed. The caller
-// bounds the number of edits. Not thread safe.
+// makes its name survive a power cut. A damaged file is reported on stderr and renamed. Not
+// thread safe.
 
 #include <cstdint>
 #include <filesystem>
@@ -16,26 +16,21 @@
 #include <string>
 #include <vector>
 
-#include "core/anchor.h"
+#include "uplink/edit_store.h"
 
 namespace pangea {
 
-class EditSpool {
+class EditSpool : public EditStore {
  public:
   // `folder`: the folder of the Spool, which exists and which this process has locked.
   EditSpool(std::filesystem::path folder, int32_t agent_id);
 
-  // The edits of an earlier run, in the order of their anchors. Call it once, at the start. Throws
-  // std::runtime_error if there is one of another agent.
-  std::vector<AnchorEdit> TakeLeft();
-  // Keeps the edit in place of an older one of the anchor. On an error, refuses() becomes true.
-  void Put(const AnchorEdit& edit);
-  // The server has answered this revision: removes the anchor's edit unless it is newer.
-  void Remove(const AnchorId& anchor, int64_t revision);
-  void Sync();
-
-  // Whether the last Put could not be written.
-  bool refuses() const { return refuses_; }
+  // In the order of their anchors. Throws std::runtime_error if there is one of another agent.
+  std::vector<AnchorEdit> TakeLeft() override;
+  void Put(const AnchorEdit& edit) override;
+  void Remove(const AnchorId& anchor, int64_t revision) override;
+  void Sync() override;
+  bool refuses() const override { return refuses_; }
 
  private:
   std::filesystem::path File(const AnchorId& anchor) const;

@@ -15,7 +15,7 @@ constexpr int64_t kMaxHeld_us = 10'000'000;
 }  // namespace
 
 UplinkAnchors::UplinkAnchors(Node& node, int32_t agent_id, double edit_bytes_per_s,
-                             EditSpool* spool)
+                             EditStore* spool)
     : node_(node), agent_id_(agent_id), spool_(spool), edits_(edit_bytes_per_s) {
   if (spool_ != nullptr) {
     for (AnchorEdit& edit : spool_->TakeLeft()) {

@@ -13,7 +13,7 @@
 #include "link/link_session.h"
 #include "uplink/agent_anchors.h"
 #include "uplink/edit_queue.h"
-#include "uplink/edit_spool.h"
+#include "uplink/edit_store.h"
 #include "uplink/pose_history.h"
 #include "uplink/shown_anchors.h"
 
@@ -25,7 +25,7 @@ class UplinkAnchors {
   using Send = std::function<int64_t(LinkKind kind, std::vector<uint8_t> body)>;
 
   // `edit_bytes_per_s`: largest rate for edits to the server. `spool` may be null.
-  UplinkAnchors(Node& node, int32_t agent_id, double edit_bytes_per_s, EditSpool* spool = nullptr);
+  UplinkAnchors(Node& node, int32_t agent_id, double edit_bytes_per_s, EditStore* spool = nullptr);
 
   static bool IsOfAnchors(LinkKind kind) {
     return kind == LinkKind::kAnchor || kind == LinkKind::kAnchorEditAnswers;
@@ -69,7 +69,7 @@ class UplinkAnchors {
 
   Node& node_;
   const int32_t agent_id_;
-  EditSpool* const spool_;
+  EditStore* const spool_;
   int64_t now_us_ = 0;
   std::map<AnchorId, Held> held_;  // at most EditQueue::kMaxEdits
   EditQueue edits_;

@@ -45,14 +45,14 @@ const char* KindForPeople(LinkKind kind) {
 }  // namespace
 
 UplinkProcess::UplinkProcess(Bus& agent_bus, Bus& link_bus, int32_t agent_id, const SecretKey& key,
-                             const UplinkOptions& options, Spool* spool, EditSpool* edit_spool)
+                             const UplinkOptions& options, Spool* spool, EditStore* edit_store)
     : agent_id_(agent_id),
       link_bus_(link_bus),
       node_(agent_bus, fmt::format("uplink_{}", agent_id)),
       session_(agent_id, key),
       spool_(spool),
       uplink_(options, [this](const KeyframeId& id) { return Load(id); }),
-      anchors_(node_, agent_id, AnchorBytesPerSecond(options), edit_spool) {
+      anchors_(node_, agent_id, AnchorBytesPerSecond(options), edit_store) {
   node_.Watch(link_bus);
   if (options.budget_kb_per_s > 0) {
     ladder_.emplace(1000 * options.budget_kb_per_s);

@@ -24,7 +24,7 @@ class UplinkProcess : public PolledProcess {
  public:
   UplinkProcess(Bus& agent_bus, Bus& link_bus, int32_t agent_id, const SecretKey& key,
                 const UplinkOptions& options, Spool* spool = nullptr,
-                EditSpool* edit_spool = nullptr);
+                EditStore* edit_store = nullptr);
 
   int Poll(int64_t steady_us) override;
   void Tick(int64_t now_utime) override;

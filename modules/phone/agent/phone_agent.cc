@@ -40,7 +40,7 @@ PhoneAgent::PhoneAgent(const AgentConfig& config)
       odometry_(MakeOdometry(agent_bus_, config)),
       now_us_(config.opened_utime) {
   if (config.key) {
-    uplink_.emplace(agent_bus_, link_bus_, agent_id_, *config.key, config.uplink);
+    uplink_.emplace(agent_bus_, link_bus_, agent_id_, *config.key, config.uplink, nullptr, &edits_);
   }
   Listen();
 }
@@ -108,10 +108,23 @@ void PhoneAgent::OnLinkDown(Bytes packet) {
 void PhoneAgent::Restore(const std::string& id, Bytes bytes) {
   const std::optional<KeyframeHead> keyframe = HeadOf(bytes);
   if (!keyframe) {
-    events_.spool.push_back({id, {}});
+    RestoreEdit(id, bytes);
   } else if (keyframe->id.map.agent_id == agent_id_ && uplink_) {
     spooled_.insert(keyframe->id);
     agent_bus_.Publish(channels::Keyframe(agent_id_), bytes);
+    agent_bus_.Drain();
+  }
+}
+
+// The edit is published as if the app had just made it, so the uplink takes it.
+void PhoneAgent::RestoreEdit(const std::string& id, Bytes bytes) {
+  anchor_edit_t message{};
+  const bool decodes = DecodeMessage(bytes, &message);
+  const std::optional<AnchorEdit> edit = decodes ? Parse(message).value : std::nullopt;
+  if (!edit || !RefusalOfNewEdit(*edit).empty()) {
+    events_.spool.push_back({id, {}});
+  } else if (edit->agent_id == agent_id_ && uplink_) {
+    node_.Publish(channels::AnchorRequest(agent_id_), message);
     agent_bus_.Drain();
   }
 }

@@ -29,6 +29,7 @@
 #include "phone/agent/agent_config.h"
 #include "phone/agent/drawn_anchors.h"
 #include "phone/agent/odometry.h"
+#include "phone/agent/stored_edits.h"
 #include "uplink/uplink_process.h"
 
 namespace pangea::phone {
@@ -46,12 +47,6 @@ struct PhonePose {
     Rigid3 T_map_body;
   };
   std::optional<InGroup> in_group;
-};
-
-// A keyframe that the owner must store until it is acknowledged, or may now delete.
-struct SpoolChange {
-  std::string id;
-  std::vector<uint8_t> bytes;  // empty: delete
 };
 
 // The output since the last Take. Of poses, cameras, statuses, anchors and others only the newest
@@ -87,8 +82,8 @@ class PhoneAgent {
   void AddImage(int64_t utime, const cv::Mat& image,
                 const std::optional<Rigid3>& T_odom_body = std::nullopt);
   void OnLinkDown(Bytes packet);
-  // Gives back a keyframe that an earlier run stored. Call it before the first image, in the order
-  // in which they were stored. A damaged keyframe is deleted (PhoneEvents::spool).
+  // Gives back a keyframe or an edit that an earlier run stored. Call it before the first image, in
+  // the order in which they were stored. A damaged one is deleted (PhoneEvents::spool).
   void Restore(const std::string& id, Bytes bytes);
   // Throws std::runtime_error if there is no key, the odometry did not track that image, or a field
   // is out of bounds.
@@ -114,6 +109,7 @@ class PhoneAgent {
 
   void Listen();
   void RefuseImage(int64_t utime, const cv::Size& size);
+  void RestoreEdit(const std::string& id, Bytes bytes);
   void OnKeyframe(Bytes data);
   void OnPose(const pose_t& message);
   void NoteTracked(int64_t utime, const MapId& map);
@@ -126,6 +122,8 @@ class PhoneAgent {
   LocalBus link_bus_;
   Node node_;
   const std::unique_ptr<Odometry> odometry_;
+  PhoneEvents events_;
+  StoredEdits edits_{&events_.spool};
   std::optional<UplinkProcess> uplink_;  // only with a key
   DrawnAnchors anchors_;
   MapId map_;                             // of the newest pose
@@ -135,7 +133,6 @@ class PhoneAgent {
   int64_t now_us_ = 0;
   int64_t next_tick_us_ = 0;
   int64_t last_created_utime_ = 0;  // of the newest anchor made here
-  PhoneEvents events_;
 };
 
 }  // namespace pangea::phone

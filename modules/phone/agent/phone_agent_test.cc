@@ -4,8 +4,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <map>
 
 #include "agent_handler/agent_handler_process.h"
 #include "link/agent_key.h"
@@ -304,6 +306,68 @@ TEST_F(PhoneAgentWithDevicePosesTest, AnAnchorIsPlacedInTheMapOfItsImage) {
   agent_.PlaceAnchor({"cup", "", utime, Eigen::Vector2d(9, 9), {}});
   Run(15);
   EXPECT_EQ(placed->map, (MapId{7, kStart_us + 1}));
+}
+
+// The visitor placed anchors without a network, closed the page, and opens it again.
+TEST_F(PhoneAgentWithDevicePosesTest, AnchorsOfAnEarlierRunReachTheServerAndAreDeletedThen) {
+  PhoneAgent earlier(ReadAgentConfig(WithDevicePoses()));
+  std::map<std::string, std::vector<uint8_t>> stored;
+  std::vector<std::string> order;
+  const auto store = [&] {
+    for (SpoolChange& change : earlier.Take().spool) {
+      std::erase(order, change.id);
+      if (!change.bytes.empty()) {
+        order.push_back(change.id);
+      }
+      stored[change.id] = std::move(change.bytes);
+    }
+  };
+  int64_t utime = 0;
+  for (int i = 0; i < 10; ++i) {
+    earlier.AddImage(utime += 100'000, cv::Mat(48, 64, CV_8U, cv::Scalar(0)),
+                     Rigid3{Eigen::Quaterniond::Identity(), {0.1 * i, 0, 1.5}});
+    earlier.Poll(kStart_us + utime);
+  }
+  const AnchorId kettle = earlier.PlaceAnchor({"kettle", "", utime - 300'000, {}, Rigid3()});
+  store();  // the page may be killed at any time
+  EXPECT_EQ(std::count(order.begin(), order.end(), "anchor " + ToString(kettle)), 1);
+  earlier.PlaceAnchor({"cup", "a", utime, Eigen::Vector2d(9, 9), {}});
+  earlier.Flush();
+  store();
+  std::map<AnchorId, AnchorEdit> placed;
+  server_bus_.Subscribe("ANCHOR_EDIT", [&](const std::string&, Bytes data) {
+    anchor_edit_t message{};
+    ASSERT_TRUE(DecodeMessage(data, &message));
+    const AnchorEdit edit = *Parse(message).value;
+    placed[edit.anchor] = edit;
+  });
+  for (const std::string& id : order) {
+    agent_.Restore(id, stored[id]);
+  }
+  Run(3);
+  ASSERT_EQ(placed.size(), 2u);
+  EXPECT_EQ(placed[kettle].name, "kettle");
+  EXPECT_EQ(placed[kettle].map, (MapId{7, kStart_us}));
+  for (const auto& [id, edit] : placed) {
+    EXPECT_TRUE(edit.T_odom_body) << edit.name;
+  }
+  for (const SpoolChange& change : spool_) {
+    stored[change.id] = change.bytes;
+  }
+  for (const auto& [id, bytes] : stored) {
+    EXPECT_TRUE(bytes.empty()) << id;
+  }
+}
+
+TEST_F(PhoneAgentTest, ADamagedEditIsDeletedAndAnothersIsLeft) {
+  std::vector<uint8_t> damaged = EncodeMessage(ToMessage(TestEdit({7, 1}, 1, 7)));
+  damaged.resize(damaged.size() / 2);
+  agent_.Restore("damaged", damaged);
+  agent_.Restore("another's", EncodeMessage(ToMessage(TestEdit({8, 1}, 1, 8))));
+  Run(2);
+  ASSERT_EQ(spool_.size(), 1u);
+  EXPECT_EQ(spool_[0].id, "damaged");
+  EXPECT_TRUE(spool_[0].bytes.empty());
 }
 
 TEST_F(PhoneAgentTest, AnImageOfAnotherSizeIsRefusedAndCountedAndThePoseSaysWhy) {

@@ -37,7 +37,7 @@ export class AgentClient {
     this.worker.postMessage(message, transfer);
   }
 
-  // Resolves when all unsent keyframes are stored.
+  // Resolves when all that is unsent is stored.
   close(): Promise<void> {
     return (this.closing ??= this.end());
   }

@@ -27,7 +27,7 @@ export type ToWorker =
   | { kind: "place"; edit: NewAnchor }
   | { kind: "remove"; id: string }
   | { kind: "end_map" } // finishes the keyframes in the window; the next image opens a new map
-  | { kind: "close" }; // ends the map; keyframes that the server does not have are stored for the next time
+  | { kind: "close" }; // ends the map; what the server does not have is stored for the next time
 
 export const kImuStride = 7;
 

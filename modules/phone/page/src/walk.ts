@@ -119,7 +119,7 @@ export class Walk {
     this.client.say({ kind: "end_map" });
   }
 
-  // The agent runs on until close, to send the keyframes that the server does not have yet.
+  // The agent runs on until close, to send what the server does not have yet.
   stop() {
     this.stopSensors();
     this.endMap();
@@ -139,7 +139,7 @@ export class Walk {
     return this.newestImage_ms !== undefined && performance.now() - this.newestImage_ms > kCameraSilence_ms;
   }
 
-  // Number of keyframes that the server has not acknowledged.
+  // Number of keyframes and edits of anchors that the server has not acknowledged.
   get numUnsent(): number {
     return this.uplink?.counters.pending ?? 0;
   }

@@ -1,4 +1,4 @@
-// Runs the agent in a Web Worker: odometry, uplink, the WebSocket to the gateway, and the store of keyframes that wait for the server.
+// Runs the agent in a Web Worker: odometry, uplink, the WebSocket to the gateway, and the store of what waits for the server.
 
 import { PhoneAgent } from "./agent/phone_agent";
 import type { PhoneEvents, NewAnchor, WasmModuleFactory } from "./agent/phone_agent";

@@ -111,7 +111,7 @@ export interface PhoneEvents {
   anchors?: DrawnAnchor[];
   /** Comes five times per second while there are any; absent in between. An agent that is not in it for two seconds is away. */
   others?: Others;
-  /** Changes of the stored keyframes, to be applied in this order. */
+  /** Changes of the stored keyframes and edits of anchors, to be applied in this order. */
   spool: SpoolChange[];
   /** Newly finished keyframes (encoded keyframe_t or keyframe_2_t), for --out-keyframes and tests. */
   keyframes: Uint8Array[];
@@ -208,7 +208,7 @@ export class PhoneAgent {
     this.native.onLinkDown(packet);
   }
 
-  /** Gives back the keyframes that an earlier run put and did not delete, in the order of putting. Call it before the first image. */
+  /** Gives back what an earlier run put and did not delete, in the order of putting. Call it before the first image. */
   restoreSpool(entries: Array<{ id: string; bytes: Uint8Array }>): void {
     for (const { id, bytes } of entries) {
       this.native.restore(id, bytes);

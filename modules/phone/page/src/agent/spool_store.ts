@@ -1,4 +1,5 @@
-// Stores keyframes that wait for the server in the browser's IndexedDB, so that they are still there when the page is opened again.
+// Stores keyframes and edits of anchors that wait for the server in the browser's IndexedDB, so that they are still there when the page is
+// opened again.
 
 import type { SpoolChange } from "./phone_agent";
 
