@@ -17,6 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kPart = ".part";
+constexpr int64_t kWriteBackEvery = 4'000'000;  // bytes
 constexpr const char* kCannotWrite = "the server cannot write it: tell whoever runs it";
 
 }  // namespace
@@ -84,7 +85,7 @@ std::string RecordingFolder::Begin(int32_t agent_id, int64_t bytes) {
   if (fd < 0) {
     return kCannotWrite;
   }
-  uploads_[agent_id] = {fd, bytes, 0};
+  uploads_[agent_id] = {.fd = fd, .bytes = bytes};
   return "";
 }
 
@@ -92,7 +93,18 @@ std::string RecordingFolder::Write(int32_t agent_id, Bytes data) {
   Upload& upload = uploads_.at(agent_id);
   const bool written = WriteFully(upload.fd, upload.written, data.data(), data.size());
   upload.written += static_cast<int64_t>(data.size());
+  StartWriteBack(&upload);
   return written ? "" : kCannotWrite;
+}
+
+// The kernel would keep hundreds of megabytes in memory, and Finish would wait for them, with the
+// links of all agents. This does not wait, and does not fail: Finish sees errors.
+void RecordingFolder::StartWriteBack(Upload* upload) {
+  if (upload->written - upload->on_its_way >= kWriteBackEvery) {
+    sync_file_range(upload->fd, upload->on_its_way, upload->written - upload->on_its_way,
+                    SYNC_FILE_RANGE_WRITE);
+    upload->on_its_way = upload->written;
+  }
 }
 
 RecordingStore::Kept RecordingFolder::Finish(int32_t agent_id) {

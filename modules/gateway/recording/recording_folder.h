@@ -33,7 +33,9 @@ class RecordingFolder : public RecordingStore {
     int fd = -1;
     int64_t bytes = 0;  // size of the finished file
     int64_t written = 0;
+    int64_t on_its_way = 0;  // bytes whose way to the disk has begun
   };
+  static void StartWriteBack(Upload* upload);
   std::filesystem::path PartOf(int32_t agent_id) const;
   std::filesystem::path NewName(int32_t agent_id) const;
   bool HasRoomFor(int64_t bytes) const;

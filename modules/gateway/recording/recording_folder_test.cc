@@ -1,9 +1,15 @@
 #include "gateway/recording/recording_folder.h"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/statfs.h>
+#include <sys/syscall.h>
+#include <unistd.h>
 
 #include <fstream>
+#include <optional>
+#include <vector>
 
 #include "files/text_file.h"
 
@@ -15,6 +21,26 @@ using testing::HasSubstr;
 
 Bytes BytesOf(std::string_view text) {
   return {reinterpret_cast<const uint8_t*>(text.data()), text.size()};
+}
+
+// Bytes of the file whose way to the disk has not begun. Nothing before Linux 6.5, and where files
+// are in memory.
+std::optional<int64_t> DirtyBytes(const fs::path& file) {
+  constexpr int64_t kCacheStat = 451;  // of Linux 6.5, which glibc does not name yet
+  constexpr int64_t kTmpfs = 0x01021994;
+  struct {
+    uint64_t offset = 0, size = 0;
+  } whole;
+  struct {
+    uint64_t cached, dirty, under_way, evicted, evicted_recently;
+  } pages{};
+  struct statfs system {};
+  const int fd = open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  const bool known = fstatfs(fd, &system) == 0 && system.f_type != kTmpfs &&
+                     syscall(kCacheStat, fd, &whole, &pages, 0) == 0;
+  close(fd);
+  return known ? std::optional(static_cast<int64_t>(pages.dirty) * sysconf(_SC_PAGESIZE))
+               : std::nullopt;
 }
 
 class RecordingFolderTest : public testing::Test {
@@ -60,6 +86,22 @@ TEST_F(RecordingFolderTest, CountsWhatAPersonUnpackedThere) {
   std::ofstream(folder_ / "walk" / "mav0" / "a.jpg") << "12345";
   EXPECT_EQ(recordings.Begin(7, 5), "");
   EXPECT_THAT(recordings.Begin(7, 6), HasSubstr("no room"));
+}
+
+// Else the end of a large upload would block the gateway for seconds.
+TEST_F(RecordingFolderTest, LittleWaitsForTheDiskAtTheEnd) {
+  RecordingFolder recordings(folder_, 100'000'000);
+  EXPECT_EQ(recordings.Begin(7, 30'000'000), "");
+  const std::vector<uint8_t> part(60'000);
+  for (int i = 0; i < 500; ++i) {
+    EXPECT_EQ(recordings.Write(7, part), "");
+  }
+  const std::optional<int64_t> dirty = DirtyBytes(folder_ / "agent_7.part");
+  if (!dirty) {
+    GTEST_SKIP() << "the system does not tell";
+  }
+  EXPECT_LT(*dirty, 5'000'000);
+  EXPECT_EQ(recordings.Finish(7).error, "");
 }
 
 TEST_F(RecordingFolderTest, NothingStaysOfWhatIsNotFinished) {
