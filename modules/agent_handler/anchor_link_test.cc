@@ -119,6 +119,21 @@ TEST_F(AnchorLink, AnAnchorWithoutANameIsRefused) {
   ExpectOnceEach(1);
 }
 
+// Some terminals obey U+009B.
+TEST_F(AnchorLink, ANameWithControlCharactersIsRefused) {
+  AnchorEdit edit = TestEdit({1, 5}, 1, 1);
+  edit.name = "a\xc2\x9b[2J";
+  Request(edit);
+  edit.anchor = {2, 5};
+  edit.agent_id = 0;
+  PublishMessage(server_bus, channels::AnchorRequest(0), ToMessage(edit));
+  Run(2);
+  ExpectOnceEach(0);
+  const char* const refusal = "anchor edit: control characters in the name";
+  EXPECT_THAT(handler_refused, testing::Contains(refusal));
+  EXPECT_THAT(uplink_refused, testing::Contains(refusal));
+}
+
 // As by the uplink of an earlier version.
 TEST_F(AnchorLink, AnAnchorWithoutANameIsRefusedToTheAgentToo) {
   KillUplink();

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "core/text.h"
+
 namespace pangea {
 
 std::string ToString(const AnchorId& id) {
@@ -9,7 +11,13 @@ std::string ToString(const AnchorId& id) {
 }
 
 std::string RefusalOfNewEdit(const AnchorEdit& edit) {
-  return edit.name.empty() && !edit.deleted ? "anchor edit: no name" : "";
+  if (edit.deleted) {
+    return "";
+  }
+  if (edit.name.empty()) {
+    return "anchor edit: no name";
+  }
+  return HasControlCharacter(edit.name) ? "anchor edit: control characters in the name" : "";
 }
 
 bool IsSameChange(const AnchorEdit& a, const AnchorEdit& b) {
@@ -26,7 +34,8 @@ bool IsSameChange(const AnchorEdit& a, const AnchorEdit& b) {
 }
 
 std::string NameOf(const AnchorState& state) {
-  return state.name.empty() ? ToString(state.anchor) : state.name;
+  return state.name.empty() || HasControlCharacter(state.name) ? ToString(state.anchor)
+                                                               : state.name;
 }
 
 }  // namespace pangea

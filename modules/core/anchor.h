@@ -56,8 +56,8 @@ struct AnchorEdit {
   std::optional<Matrix6d> covariance;               // of T_ref_anchor; none: not known
 };
 
-// Why an edit may not enter a journal, or an empty string. An anchor must have a name; journals of
-// earlier versions also have anchors without one.
+// Why an edit may not enter a journal, or an empty string. An anchor must have a name that people
+// can read; journals of earlier versions also have other anchors.
 std::string RefusalOfNewEdit(const AnchorEdit& edit);
 
 // Whether two edits of one anchor with one revision change the same. Two tools on the server (agent
@@ -82,7 +82,7 @@ struct AnchorState {
   Matrix6d covariance = Matrix6d::Identity();
 };
 
-// The anchor's name; its id if it has none.
+// The anchor's name; its id if it has none that a new edit may have.
 std::string NameOf(const AnchorState& state);
 
 struct ShownAnchor {

@@ -2,9 +2,10 @@
 
 #include <sodium.h>
 
-#include <algorithm>
 #include <cctype>
 #include <nlohmann/json.hpp>
+
+#include "core/text.h"
 
 namespace pangea {
 namespace {
@@ -25,15 +26,6 @@ char PlainLetter(char c) {
     default:
       return upper;
   }
-}
-
-// Control characters also have two bytes in UTF-8: U+0080 to U+009F, which some terminals obey.
-bool HasControl(std::string_view text) {
-  const auto is_pair = [](unsigned char a, unsigned char b) {
-    return a == 0xc2 && b >= 0x80 && b <= 0x9f;
-  };
-  return std::ranges::any_of(text, [](unsigned char c) { return c < 0x20 || c == 0x7f; }) ||
-         std::ranges::adjacent_find(text, is_pair) != text.end();
 }
 
 }  // namespace
@@ -71,7 +63,7 @@ bool IsVisitorName(std::string_view text) {
       return false;
     }
   };
-  return text.size() <= kMaxVisitorName && !HasControl(text) && is_utf8();
+  return text.size() <= kMaxVisitorName && !HasControlCharacter(text) && is_utf8();
 }
 
 std::variant<JoinRequest, std::string> ParseJoinRequest(std::string_view body) {

@@ -15,7 +15,8 @@ constexpr int kMaxShown = 256;
 constexpr int64_t kMaxRevision = 1LL << 60;
 constexpr double kMaxPixel = 1e5;
 
-// Whether the text can be shown to people: it has no control characters and is short enough.
+// Whether the text is short enough and on one line. Journals of earlier versions may have other
+// control characters: RefusalOfNewEdit.
 bool IsName(const std::string& name) {
   return name.size() <= kMaxAnchorName &&
          std::none_of(name.begin(), name.end(),

@@ -83,6 +83,12 @@ TEST_F(AnchorApiTest, AChangeOfAnAnchorWithoutANameGivesItOne) {
   JournalNewest();
   EXPECT_EQ(changed->status, 200);
   EXPECT_EQ(changed->body["name"], id);
+  nameless.revision = 3;
+  nameless.name = "a\xc2\x9b";
+  Journal(nameless);
+  const auto again = Ask("PUT", "/v1/anchors/" + id, R"({"payload": "hot"})");
+  JournalNewest();
+  EXPECT_EQ(again->body["name"], id);
 }
 
 TEST_F(AnchorApiTest, TwoChangesAtOnceHaveTwoRevisions) {

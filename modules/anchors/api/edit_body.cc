@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/text.h"
 #include "options/nearest_word.h"
 
 namespace pangea {
@@ -25,11 +26,6 @@ constexpr int64_t kMaxSeq = 10'000'000;
 constexpr double kMaxDistance_m = 1e5;
 constexpr double kMaxPixel = 1e5;
 constexpr double kNormTolerance = 1e-3;
-
-// Control characters are refused: LCM's strings end at a zero, and a name is for people.
-bool HasControl(const std::string& text) {
-  return std::ranges::any_of(text, [](unsigned char c) { return c < 0x20 || c == 0x7f; });
-}
 
 // Reads the fields of a JSON object by name; throws BadField for an error.
 class Fields {
@@ -153,7 +149,8 @@ EditBody ParseFields(const json& body, BodyOf of) {
     if (edit.name->empty()) {
       throw BadField{"name", fmt::format("is empty: give 1 to {} bytes", kMaxAnchorName)};
     }
-    if (HasControl(*edit.name)) {
+    // LCM's strings end at a zero, and a name is for people.
+    if (HasControlCharacter(*edit.name)) {
       throw BadField{"name", "has control characters: give one line of text"};
     }
   }

@@ -69,6 +69,7 @@ TEST(EditBody, WhatIsWrongIsNamedWithHowToMendIt) {
       {R"({"name": "a"})", "pose", "is missing"},
       {"{" + at + "}}", "name", "is missing"},
       {R"({"name": "", )" + at + "}}", "name", "1 to 50 bytes"},
+      {"{\"name\": \"a\xc2\x9b\", " + at + "}}", "name", "control characters"},
       {"{\"nam\": 1, " + at + "}}", "nam", "did you mean 'name'"},
       {"{\"revision\": 1, " + at + "}}", "revision", "no such field"},
       {"{\"name\": 1, " + at + "}}", "name", "at most 50 bytes"},

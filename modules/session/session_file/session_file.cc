@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "core/anchor.h"
+#include "core/text.h"
 #include "options/nearest_word.h"
 #include "options/yaml_options.h"
 #include "server/server_processes.h"
@@ -133,13 +134,8 @@ void CheckFaults(const SessionScript& script, const std::string& file) {
   }
 }
 
-// The parser of messages accepts only such names.
-bool IsPrintable(const std::string& name) {
-  return std::ranges::none_of(name, [](unsigned char c) { return c < 0x20 || c == 0x7f; });
-}
-
 void CheckAnchor(const AnchorScript& anchor, const SessionScript& script, const std::string& file) {
-  if (anchor.name.empty() || !IsPrintable(anchor.name)) {
+  if (anchor.name.empty() || HasControlCharacter(anchor.name)) {
     throw std::runtime_error(fmt::format(
         "{}: anchors: at {} s: 'name' must be a text of printable characters", file, anchor.at_s));
   }

@@ -197,6 +197,7 @@ TEST_F(SessionFileTest, ReadsAnchors) {
   refuses(kettle + "\n  - " + kettle, "the name 'kettle' is given twice");
   refuses("{agent: 1, at: 1, name: '', pixel: [1, 1]}", "'name' must be a text");
   refuses("{agent: 1, at: 1, name: \"a\\nb\", pixel: [1, 1]}", "printable");
+  refuses("{agent: 1, at: 1, name: \"a\\x9bb\", pixel: [1, 1]}", "printable");
   refuses("{agent: 1, at: 1, name: " + std::string(51, 'a') + ", pixel: [1, 1]}",
           ":3: key 'anchors[0].name' must be a text of at most 50 bytes, not 51");
   refuses("{agent: 1, at: 1, name: a, pixel: [1, 1], payload: " + std::string(1001, 'a') + "}",

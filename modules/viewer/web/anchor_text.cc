@@ -1,8 +1,9 @@
 #include "viewer/web/anchor_text.h"
 
-#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+
+#include "core/text.h"
 
 namespace pangea::viewer {
 namespace {
@@ -23,7 +24,7 @@ bool TakeName(const json& value, AnchorChange* change) {
   }
   change->name = value.get<std::string>();
   return !change->name.empty() && change->name.size() <= kMaxAnchorName &&
-         std::ranges::none_of(change->name, [](unsigned char c) { return c < 0x20 || c == 0x7f; });
+         !HasControlCharacter(change->name);
 }
 
 bool TakeId(const json& value, AnchorChange* change) {

@@ -53,6 +53,7 @@ TEST(AnchorText, NoPageOfOursSaysThis) {
       R"("anchor_add": {"name": "", )" + place + "}",
       R"("anchor_add": {"name": 7, )" + place + "}",
       R"("anchor_add": {"name": "a\nb", )" + place + "}",
+      R"("anchor_add": {"name": "a\u009bb", )" + place + "}",
       R"("anchor_add": {"name": "a\u0000b", )" + place + "}",
       R"("anchor_add": {"name": ")" + std::string(101, 'a') + R"(", )" + place + "}",
       R"("anchor_add": {"name": "a", "payload": "b", )" + place + "}",

@@ -6,7 +6,7 @@ const fits = (name: string) => new TextEncoder().encode(name).length <= kMaxByte
 
 // Without control characters, and cut to kMaxBytes.
 export function anchorName(text: string): string {
-  const name = [...text.replace(/[\u0000-\u001f\u007f]/g, " ").trim()];
+  const name = [...text.replace(/[\u0000-\u001f\u007f-\u009f]/g, " ").trim()];
   while (!fits(name.join(""))) name.pop();
   return name.join("");
 }
