@@ -1,4 +1,5 @@
 import "fake-indexeddb/auto";
+import { forceCloseDatabase } from "fake-indexeddb";
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { SpoolStore, spoolOf } from "./spool_store";
@@ -44,6 +45,54 @@ test("on a full disk nothing is put, but what the server has is deleted", async 
   assert.deepEqual(await ids(store), ["2"]);
   await store.apply([put("4", 4)]);
   assert.deepEqual(await ids(store), ["2", "4"]);
+});
+
+// A store, and its database, which a test can close as browsers do with a page in the background.
+async function opened(name: string): Promise<[SpoolStore, IDBDatabase]> {
+  const { open } = indexedDB;
+  const databases: IDBDatabase[] = [];
+  indexedDB.open = (...what) => {
+    const request = open.apply(indexedDB, what);
+    request.addEventListener("success", () => databases.push(request.result));
+    return request;
+  };
+  const store = await SpoolStore.open(name).finally(() => (indexedDB.open = open));
+  return [store, databases[0]];
+}
+const forceClose = (database: IDBDatabase) => forceCloseDatabase(database as unknown as Parameters<typeof forceCloseDatabase>[0]);
+
+test("a database that the browser closes is opened again, and nothing is lost", async () => {
+  for (const [name, close] of [["closed", forceClose], ["silent", (database: IDBDatabase) => database.close()]] as const) {
+    const [store, database] = await opened(name);
+    await store.apply([put("1", 1), put("2", 2)]);
+    const during = store.apply([remove("1"), put("3", 3)]);
+    close(database);
+    await during;
+    await Promise.all([store.apply([put("4", 4)]), store.apply([remove("4"), put("5", 5)])]);
+    assert.deepEqual(await ids(store), ["2", "3", "5"], name);
+  }
+});
+
+test("what the browser has removed is told once; what comes then is kept", async () => {
+  const [store, database] = await opened("removed");
+  await store.apply([put("1", 1), put("2", 2)]);
+  forceClose(database);
+  await new Promise((resolve) => (indexedDB.deleteDatabase("removed").onsuccess = resolve));
+  await assert.rejects(store.apply([put("3", 3)]), /removed 2/);
+  await store.apply([put("4", 4)]);
+  assert.deepEqual(await ids(store), ["3", "4"]);
+});
+
+test("one that cannot be opened again is an error, until it can be", async () => {
+  const [store, database] = await opened("gone");
+  forceClose(database);
+  const { open } = indexedDB;
+  indexedDB.open = () => {
+    throw new Error("no storage");
+  };
+  await assert.rejects(store.apply([put("1", 1), remove("0")]), /no storage/).finally(() => (indexedDB.open = open));
+  await store.apply([put("2", 2)]);
+  assert.deepEqual(await ids(store), ["2"]);
 });
 
 test("all are removed, also one that is open", async () => {

@@ -5,6 +5,7 @@ import type { SpoolChange } from "./phone_agent";
 
 const kStore = "keyframes";
 const kPrefix = "pangea.spool.";
+const kReopenPauses_ms = [0, 300, 1000]; // before each attempt; together less than the page waits for an agent to close
 
 export const spoolOf = (agent: number) => `${kPrefix}${agent}`;
 
@@ -21,18 +22,24 @@ interface Entry {
 }
 
 export class SpoolStore {
+  private isClosed = false; // by us
+  private nextOrder = 0;
+  private readonly kept = new Set<string>(); // ids of the entries
+  private numGone = 0; // entries that were found missing, and not told yet
+  private pending: SpoolChange[] = [];
+  private applied: Promise<void> = Promise.resolve(); // resolves when none is pending
+
   private constructor(
-    private readonly database: IDBDatabase,
-    private nextOrder: number,
+    private readonly name: string,
+    private database: IDBDatabase,
   ) {}
 
   static async open(name: string): Promise<SpoolStore> {
-    const request = indexedDB.open(name, 1);
-    request.onupgradeneeded = () => request.result.createObjectStore(kStore, { keyPath: "id" });
-    const database = await done(request);
-    database.onversionchange = () => database.close(); // it is being removed
-    const store = new SpoolStore(database, 0);
-    store.nextOrder = ((await store.entries()).at(-1)?.order ?? -1) + 1;
+    const store = new SpoolStore(name, await connect(name));
+    store.watch();
+    const entries = await store.entries();
+    store.nextOrder = (entries.at(-1)?.order ?? -1) + 1;
+    for (const { id } of entries) store.kept.add(id);
     return store;
   }
 
@@ -49,18 +56,67 @@ export class SpoolStore {
   }
 
   // Applies all changes. If that fails, for instance on a full disk, only the deletions are applied, because they make room. Several calls
-  // take effect in their order.
-  async apply(changes: SpoolChange[]): Promise<void> {
-    try {
-      await this.write(changes);
-    } catch (error) {
-      await this.write(changes.filter(({ op }) => op === "delete"));
-      throw error;
-    }
+  // take effect in their order. Also throws if the browser has removed entries, after it has applied the changes.
+  apply(changes: SpoolChange[]): Promise<void> {
+    this.pending.push(...changes);
+    const now = () => this.applyPending();
+    return (this.applied = this.applied.then(now, now));
   }
 
   close() {
+    this.isClosed = true;
     this.database.close();
+  }
+
+  // Also those of later calls, so that slow attempts to open the database again do not queue up.
+  private async applyPending() {
+    const changes = this.pending.splice(0);
+    try {
+      await this.writeOrReopen(changes);
+    } catch (error) {
+      await this.write(changes.filter(({ op }) => op === "delete")).catch(() => {});
+      throw error;
+    }
+    const { numGone } = this;
+    this.numGone = 0;
+    if (numGone > 0) throw new Error(`it has removed ${numGone} keyframes and anchors`);
+  }
+
+  // A browser may close a database that is open, for instance of a page in the background; not all tell so.
+  private async writeOrReopen(changes: SpoolChange[]) {
+    try {
+      await this.write(changes);
+    } catch (error) {
+      if (this.isClosed || (error as DOMException | null)?.name === "QuotaExceededError") throw error;
+      await this.reopen();
+      await this.write(changes);
+    }
+  }
+
+  private async reopen() {
+    this.database.close();
+    let failure: unknown;
+    for (const pause_ms of kReopenPauses_ms) {
+      if (pause_ms > 0) await new Promise((resolve) => setTimeout(resolve, pause_ms));
+      try {
+        this.database = await connect(this.name);
+        this.watch();
+        return await this.countGone();
+      } catch (error) {
+        failure = error;
+      }
+    }
+    throw failure;
+  }
+
+  private watch() {
+    this.database.onversionchange = () => this.close(); // it is being removed
+  }
+
+  // A browser that cleans up closes a database and removes it.
+  private async countGone() {
+    const left = new Set(await done(this.database.transaction(kStore).objectStore(kStore).getAllKeys()));
+    for (const id of this.kept) if (!left.has(id) && this.kept.delete(id)) ++this.numGone;
   }
 
   // Writes all or nothing.
@@ -76,5 +132,12 @@ export class SpoolStore {
       transaction.oncomplete = resolve;
       transaction.onabort = () => reject(transaction.error);
     });
+    for (const { op, id } of changes) op === "put" ? this.kept.add(id) : this.kept.delete(id);
   }
+}
+
+function connect(name: string): Promise<IDBDatabase> {
+  const request = indexedDB.open(name, 1);
+  request.onupgradeneeded = () => request.result.createObjectStore(kStore, { keyPath: "id" });
+  return done(request);
 }
