@@ -17,6 +17,7 @@ export interface OpenAgent {
   cameraYaml: string;
   imuYaml?: string;
   vioOptionsYaml?: string;
+  openedUtime: number; // of its first map (openingTime)
   devicePoses?: boolean; // images have poses of the device's odometry, which replaces ours
 }
 

@@ -1,6 +1,7 @@
 // One walk of an agent: its sensors, live or played, its worker, and its newest state, which the page draws.
 
 import { AgentClient } from "./agent_client";
+import { openingTime } from "./agent/opening_time";
 import type { PhonePose, ProcessStatus, DrawnAnchor } from "./agent/phone_agent";
 import type { FromWorker, LinkState, Membership } from "./messages";
 import type { CalibratedRecording, ImuSample } from "./recording/euroc";
@@ -9,6 +10,7 @@ import type { RecordedPicture } from "./recording/player";
 import { Recorder } from "./recording/recorder";
 import { kPhoneImu } from "./sensors/calibration";
 import type { Camera, CameraImage } from "./sensors/camera";
+import { utimeOf } from "./sensors/clock";
 import { brightnessOf } from "./sensors/luma";
 import { OtherAgents } from "./other_agents";
 import { Motion } from "./sensors/motion";
@@ -51,7 +53,8 @@ export class Walk {
     private readonly events: WalkEvents,
   ) {
     this.link = membership && "connecting";
-    const open = { kind: "open", membership, cameraYaml: yaml.camera, imuYaml: yaml.imu, devicePoses: !yaml.imu } as const;
+    const openedUtime = openingTime(utimeOf(performance.now()));
+    const open = { kind: "open", membership, cameraYaml: yaml.camera, imuYaml: yaml.imu, openedUtime, devicePoses: !yaml.imu } as const;
     this.client = new AgentClient(open, (message) => this.take(message));
   }
 

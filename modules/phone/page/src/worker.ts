@@ -27,7 +27,7 @@ class AgentHost {
     private readonly devicePoses: boolean,
   ) {}
 
-  static async open({ membership, cameraYaml, imuYaml, vioOptionsYaml, devicePoses }: OpenAgent): Promise<AgentHost> {
+  static async open({ membership, cameraYaml, imuYaml, vioOptionsYaml, openedUtime, devicePoses }: OpenAgent): Promise<AgentHost> {
     const module: { default: WasmModuleFactory } = await import(/* @vite-ignore */ kModule);
     const agent = await PhoneAgent.load(module.default, {
       agent: membership?.agent ?? kAlone,
@@ -36,7 +36,7 @@ class AgentHost {
       imuYaml,
       vioOptionsYaml,
       devicePoses,
-      openedUtime: now_us(),
+      openedUtime,
     });
     const host = new AgentHost(agent, devicePoses ?? false);
     if (membership) await host.connect(membership.agent, membership.key);
