@@ -16,6 +16,7 @@ const kFrustumDepth = 0.6; // metres
 export class AgentDrawing {
   readonly group = new Group();
   private readonly label = document.createElement("span");
+  private readonly material: LineBasicMaterial;
   private readonly frustum: LineSegments;
   private readonly ellipse: LineLoop;
   private readonly tail: Line;
@@ -25,18 +26,18 @@ export class AgentDrawing {
   private view = ""; // the view from which the frustum was made
 
   constructor(private agent: AgentSaid, labels: HTMLElement) {
-    const material = new LineBasicMaterial({ color: agentColour(agent.id) });
+    this.material = new LineBasicMaterial({ color: agentColour(agent.id) });
     const circle = new BufferGeometry().setFromPoints(
       Array.from({ length: 48 }, (_, i) => {
         const angle = (i / 24) * Math.PI;
         return new Vector3(Math.cos(angle), Math.sin(angle), 0);
       }),
     );
-    this.frustum = new LineSegments(new BufferGeometry(), material);
-    this.ellipse = new LineLoop(circle, material);
+    this.frustum = new LineSegments(new BufferGeometry(), this.material);
+    this.ellipse = new LineLoop(circle, this.material);
     const tail = new BufferGeometry();
     tail.setAttribute("position", new BufferAttribute(new Float32Array(3 * (kTail + 2)), 3));
-    this.tail = new Line(tail, material);
+    this.tail = new Line(tail, this.material);
     for (const object of [this.frustum, this.ellipse, this.tail]) {
       object.frustumCulled = false;
       object.matrixAutoUpdate = false;
@@ -50,6 +51,8 @@ export class AgentDrawing {
   remove() {
     this.group.removeFromParent();
     this.label.remove();
+    for (const { geometry } of [this.frustum, this.ellipse, this.tail]) geometry.dispose();
+    this.material.dispose();
   }
 
   forgetTrail() {

@@ -34,12 +34,11 @@ export class AnchorTools {
     canvas.addEventListener("pointerdown", (event) => this.pointerDown(event), { capture: true });
     canvas.addEventListener("pointermove", (event) => this.pointerMove(event));
     canvas.addEventListener("pointerup", (event) => this.pointerUp(event));
-    canvas.addEventListener("pointercancel", () => this.endDrag());
+    canvas.addEventListener("pointercancel", () => this.cancelDrag());
     addEventListener("keydown", ({ key }) => {
       if (key !== "Escape") return;
       this.place(false);
-      if (this.drag) this.model.putBack(this.drag.index);
-      this.endDrag();
+      this.cancelDrag();
     });
   }
 
@@ -147,6 +146,13 @@ export class AnchorTools {
   // Asks the server for a change.
   private ask(change: Said) {
     if (!this.connection.say(change)) this.announce("Not connected: nothing was changed");
+  }
+
+  // The anchor goes back to where the server has it.
+  private cancelDrag() {
+    if (this.drag) this.model.putBack(this.drag.index);
+    this.endDrag();
+    this.stage.redraw();
   }
 
   private endDrag() {

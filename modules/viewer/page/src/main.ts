@@ -118,7 +118,7 @@ slider.oninput = () => {
   dragging = true;
   connection.say({ seek: Number(slider.value) });
 };
-slider.onchange = () => (dragging = false);
+slider.onchange = slider.onpointercancel = () => (dragging = false);
 addEventListener("keydown", ({ key, target }) => {
   if (key === " " && (target === canvas || target === document.body)) byId("play").click();
 });
@@ -174,6 +174,7 @@ Object.assign(window, {
   pangea: {
     model,
     stage,
+    drawView,
     received: () => connection.bytes,
     // Draws every frame for some seconds, even if nothing moves.
     async framesPerSecond(seconds: number): Promise<number> {

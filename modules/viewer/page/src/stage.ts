@@ -81,8 +81,7 @@ export class Stage {
   // Sets the colours of the current theme.
   recolour() {
     this.scene.background = new Color(colours().background);
-    if (this.grid) this.scene.remove(this.grid);
-    this.grid = undefined;
+    this.removeGrid();
     for (const drawing of this.agents.values()) drawing.remove();
     this.agents.clear();
     for (const agent of this.model.agents.values()) this.drawing(agent).take(agent);
@@ -272,16 +271,19 @@ export class Stage {
     const snapped = (value: number) => Math.round(value / this.gridCell_m / 4) * this.gridCell_m * 4;
     const place = [cells, this.gridCell_m, snapped(centre.x), snapped(centre.y), Math.floor(box.min.z)];
     if (this.grid && String(this.grid.userData.place) === String(place)) return;
-    if (this.grid) {
-      this.scene.remove(this.grid);
-      this.grid.dispose();
-    }
+    this.removeGrid();
     const colour = colours().grid;
     this.grid = new GridHelper(cells * this.gridCell_m, cells, colour, colour);
     this.grid.rotation.x = Math.PI / 2;
     this.grid.position.set(place[2], place[3], place[4]);
     this.grid.userData.place = place;
     this.scene.add(this.grid);
+  }
+
+  private removeGrid() {
+    this.grid?.removeFromParent();
+    this.grid?.dispose();
+    this.grid = undefined;
   }
 
   private resize() {

@@ -17,10 +17,23 @@ async function bitmapOf(view: ViewSaid): Promise<ImageBitmap | undefined> {
   return createImageBitmap(pixels);
 }
 
+let numBegun = 0;
+let newestDrawn = 0; // its number
+
 export async function drawView(view: ViewSaid) {
   byId("view").hidden = false;
-  const canvas = byId<HTMLCanvasElement>("view_canvas");
+  const number = ++numBegun;
   const image = await bitmapOf(view).catch(() => undefined);
+  // Images may be decoded in another order than they came.
+  if (number > newestDrawn) {
+    newestDrawn = number;
+    draw(view, image);
+  }
+  image?.close();
+}
+
+function draw(view: ViewSaid, image: ImageBitmap | undefined) {
+  const canvas = byId<HTMLCanvasElement>("view_canvas");
   canvas.width = view.width;
   canvas.height = view.height;
   const context = canvas.getContext("2d")!;

@@ -54,6 +54,8 @@ async function testLog(browser) {
   await testCamera(page);
   await testBeforeAfter(page);
   await screenshot(page, "fused");
+  await testImages(page);
+  await testThemes(page);
   await testSeekBack(page);
   await testBrokenUpdate(page);
 
@@ -132,6 +134,45 @@ async function testCamera(page) {
   await screenshot(page, "camera");
 }
 
+// The first image is decoded after the second one.
+async function testImages(page) {
+  const { caption, numClosed } = await page.evaluate(async () => {
+    const { createImageBitmap } = window;
+    const decode = [];
+    let numClosed = 0;
+    window.createImageBitmap = async () => {
+      await new Promise((done) => decode.push(done));
+      return Object.assign(await createImageBitmap(new ImageData(4, 4)), { close: () => ++numClosed });
+    };
+    const view = (agent) => ({ agent, width: 4, height: 4, encoding: 2, image: new Uint8Array(1), tracks: [] });
+    const drawn = [1, 2].map((agent) => pangea.drawView(view(agent)));
+    for (const i of [1, 0]) {
+      decode[i]();
+      await drawn[i];
+    }
+    Object.assign(window, { createImageBitmap });
+    return { caption: document.getElementById("view_caption").textContent, numClosed };
+  });
+  check("an image that is decoded late does not replace a newer one", caption.startsWith("Agent 2"), caption);
+  check("each image is closed", numClosed === 2, numClosed);
+  await page.locator("#view_close").click();
+}
+
+// What was drawn with the colours of the theme before is given back to the graphics card.
+async function testThemes(page) {
+  const used = () => page.evaluate(async () => {
+    await pangea.framesPerSecond(0.2);
+    return pangea.stage.renderer.info.memory.geometries;
+  });
+  const before = await used();
+  for (const colorScheme of ["dark", "light", "dark", "light"]) {
+    await page.emulateMedia({ colorScheme });
+    await used();
+  }
+  const after = await used();
+  check("a change of theme leaves nothing behind", after === before, `${before} geometries, then ${after}`);
+}
+
 async function testBeforeAfter(page) {
   const distance = () => page.evaluate(() => {
     const [a, b] = pangea.model.maps.filter((m) => m?.newest >= 0);
@@ -156,6 +197,16 @@ async function testSeekBack(page) {
   await page.locator("#speed").selectOption("20");
   await page.locator("#play").click();
   await becomes(page, "it plays on to the end, fast", () => pangea.model.numKeyframes === 63);
+  await page.evaluate(() => {
+    const slider = document.getElementById("slider");
+    slider.value = "5";
+    for (const event of [new Event("input"), new PointerEvent("pointercancel")]) slider.dispatchEvent(event);
+  });
+  await becomes(page, "a slider that is taken away seeks", () => Math.abs(pangea.model.now_s - 5) < 0.3);
+  await page.evaluate(() => (document.getElementById("slider").value = "7"));
+  await page.locator("#speed").selectOption("5");
+  await becomes(page, "and shows the time again", () => Math.abs(document.getElementById("slider").value - 5) < 0.3, undefined, 5000);
+  await page.locator("#speed").selectOption("20");
 }
 
 async function testLive(browser) {
@@ -277,6 +328,20 @@ async function testNotices(page) {
   await page.keyboard.press("Escape");
 }
 
+// The browser takes the pointer away, for instance for a gesture of the system.
+async function testCancelledDrag(page) {
+  const before = await page.evaluate(anchorNow);
+  await page.mouse.move(before.x, before.y);
+  await page.mouse.down();
+  await page.mouse.move(before.x + 60, before.y + 40, { steps: 5 });
+  const dragged = await page.evaluate(anchorNow);
+  await page.evaluate(() => document.getElementById("stage").dispatchEvent(new PointerEvent("pointercancel", { pointerId: 1 })));
+  await page.mouse.up();
+  const after = await page.evaluate(anchorNow);
+  check("anchors: a drag that is cancelled is undone",
+    distance(dragged.at, before.at) > 0.1 && distance(after.at, before.at) < 0.01 && after.revision === before.revision);
+}
+
 async function testLiveAnchors(page) {
   await settled(page);
   await page.waitForTimeout(1500); // the camera comes to a stop
@@ -295,6 +360,7 @@ async function testLiveAnchors(page) {
       x: document.getElementById("stage").clientWidth / 2, y: document.getElementById("stage").clientHeight / 2 }) < 3);
   await page.waitForTimeout(500);
 
+  await testCancelledDrag(page);
   anchor = await page.evaluate(anchorNow);
   await page.mouse.move(anchor.x, anchor.y);
   await page.mouse.down();
