@@ -400,15 +400,7 @@ async function testMembers(browser, url) {
   await page.evaluate(() => (location.hash = "join=JKMN-PQRS"));
   await becomes(page, "a link that is followed in the same tab is read", () => document.getElementById("code").value === "JKMN-PQRS");
   const spool = "pangea.spool.2";
-  await page.evaluate((name) => new Promise((done) => {
-    const open = indexedDB.open(name, 1);
-    open.onupgradeneeded = () => open.result.createObjectStore("keyframes", { keyPath: "id" });
-    open.onsuccess = () => {
-      const writing = open.result.transaction("keyframes", "readwrite");
-      writing.objectStore("keyframes").put({ id: "2/1#0", order: 0, bytes: new Uint8Array(1) });
-      writing.oncomplete = () => (open.result.close(), done());
-    };
-  }), spool);
+  await leaveUnsent(page, spool);
   await page.route("**/v1/join", (route) => route.fulfill({ json: { agent: 2, key, site: "yard" } }));
   await page.locator("#start").click();
   await becomes(page, "whoever joins is calibrated", () => Boolean(pangea.calibration));
@@ -423,6 +415,36 @@ async function testMembers(browser, url) {
   }), spool);
   check("and does not send the keyframes of an earlier agent", left === 0, left);
   await stopAndClose(page);
+}
+
+// Stores a keyframe that waits for the server.
+const leaveUnsent = (page, spool) => page.evaluate((name) => new Promise((done) => {
+  const open = indexedDB.open(name, 1);
+  open.onupgradeneeded = () => open.result.createObjectStore("keyframes", { keyPath: "id" });
+  open.onsuccess = () => {
+    const writing = open.result.transaction("keyframes", "readwrite");
+    writing.objectStore("keyframes").put({ id: "2/1#0", order: 0, bytes: new Uint8Array(1) });
+    writing.oncomplete = () => (open.result.close(), done());
+  };
+}), spool);
+
+async function testLeaving(browser, url) {
+  const page = await openPage(browser, url, kPhone);
+  await page.evaluate((key) => localStorage.setItem("pangea.membership", JSON.stringify({ agent: 2, key, site: "hall", name: "Anna" })), "ab".repeat(32));
+  await leaveUnsent(page, "pangea.spool.2");
+  await page.reload();
+  const isMember = () => page.evaluate(() => localStorage.getItem("pangea.membership") !== null);
+  await page.locator("#forget").click();
+  await becomes(page, "whoever leaves reads what is lost", () =>
+    document.getElementById("leave_dialog").open && /key: .* 1 unsent keyframes/.test(document.getElementById("leave_text").textContent));
+  await screenshot(page, "leave");
+  await page.locator("#leave_dialog [value=cancel]").click();
+  check("and may stay", (await isMember()) && (await page.locator("#invitation").textContent()).startsWith("You are Anna"));
+  await page.locator("#forget").click();
+  await page.locator("#leave_dialog [value=leave]").click();
+  await becomes(page, "or leave", () => document.getElementById("code").checkVisibility());
+  check("without the key", !(await isMember()));
+  await page.close();
 }
 
 async function testRefusals(browser, url) {
@@ -442,6 +464,7 @@ await run(async () => {
   await testJoining(browser, url);
   await testUpload(browser, url);
   await testMembers(browser, url);
+  await testLeaving(browser, url);
   await testPlaying(browser, url, zip);
   await testUncalibrated(browser, url, zip);
   await testBroken(browser, url, zip);

@@ -49,6 +49,13 @@ export class SpoolStore {
     await Promise.all(names.map((name) => done(indexedDB.deleteDatabase(name))));
   }
 
+  static async countOf(name: string): Promise<number> {
+    const database = await connect(name);
+    const count = await done(database.transaction(kStore).objectStore(kStore).count());
+    database.close();
+    return count;
+  }
+
   // All entries, in the order in which they were put.
   async entries(): Promise<Entry[]> {
     const all: Entry[] = await done(this.database.transaction(kStore).objectStore(kStore).getAll());

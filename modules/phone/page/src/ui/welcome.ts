@@ -1,13 +1,21 @@
 // The panel before a walk: who the visitor is, and joining.
 
-import { SpoolStore } from "../agent/spool_store";
-import { byId } from "../dom";
+import { SpoolStore, spoolOf } from "../agent/spool_store";
+import { askDialog, byId } from "../dom";
 import { CodeRefused, codeIn, forgetMembership, join, keepMembership, storedMembership } from "../link/join";
 import type { Membership } from "../messages";
 import { forgetCalibrations, storedCalibrations } from "../sensors/calibration";
 import { notice } from "./notice";
 
 const nameOf = ({ name, agent }: Membership) => name || `agent ${agent}`;
+
+async function asksToLeave({ agent }: Membership): Promise<boolean> {
+  const unsent = await SpoolStore.countOf(spoolOf(agent)).catch(() => 0);
+  const lost = unsent > 0 ? ` Lost as well: ${unsent} unsent keyframes and anchors.` : "";
+  byId("leave_text").textContent = `Leaving deletes this phone's key: you need a new invite to come back.${lost} What the server has stays there.`;
+  return (await askDialog("leave_dialog")) === "leave";
+}
+
 const codeField = () => byId<HTMLInputElement>("code");
 
 export class Welcome {
@@ -15,7 +23,8 @@ export class Welcome {
   private joining?: Promise<void>;
 
   constructor() {
-    byId("forget").onclick = () => {
+    byId("forget").onclick = async () => {
+      if (!this.membership || !(await asksToLeave(this.membership))) return;
       forgetMembership();
       this.membership = undefined;
       this.show();
