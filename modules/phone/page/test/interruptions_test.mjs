@@ -1,5 +1,5 @@
-// Interruptions of phones, with a real server and gateway: the network is gone for a minute while Anna walks, and meanwhile Ben's tab
-// is killed. No keyframe may be lost; Ben's old map must stay, and his new one must fuse.
+// Interruptions of phones, with a real server and gateway: the network is gone for a minute while Anna walks, and meanwhile Ben places an
+// anchor, and his tab is killed. No keyframe and no anchor may be lost; Ben's old map must stay, and his new one must fuse.
 
 import { execFileSync } from "node:child_process";
 import { check, openPage, options, run } from "../../../viewer/page/test/harness.mjs";
@@ -42,7 +42,14 @@ function keyframesOf(server, map) {
   return { ids: [...seqs].map((seq) => `${map}#${seq}`), isWhole: [...seqs].every((seq) => seq < seqs.size) };
 }
 
-// The keyframes in a page's storage, which the server has not acknowledged.
+// The names of the anchors in the server's journal that were placed in a map.
+function anchorsOf(server, map) {
+  const list = execFileSync(`${options.bin}/pangea-log`, ["list", "--json", "--channels", "ANCHOR_EDIT", `${server.site}/journal.lcm`], { encoding: "utf8" });
+  const edits = list.split("\n").filter(Boolean).map((line) => JSON.parse(line).message);
+  return edits.filter((edit) => `${edit.map.agent_id}/${edit.map.opened_utime}` === map).map(({ name }) => name);
+}
+
+// The ids of keyframes and anchors in a page's storage, which the server has not acknowledged.
 const spooled = (page, agent) => page.evaluate((name) => new Promise((done, failed) => {
   const open = indexedDB.open(name);
   open.onerror = () => failed(open.error);
@@ -70,12 +77,17 @@ await run(async () => {
   network.cut();
   const cut = Date.now();
   const oldMap = await mapOf(ben);
+  await ben.evaluate(() => pangea.walk.placeAnchor("kettle", pangea.walk.pose.utime, [320, 240]));
   let left = [];
-  while (left.length < kLeft && Date.now() - cut < 1000 * kGone_s) {
+  let anchors = [];
+  while ((left.length < kLeft || anchors.length === 0) && Date.now() - cut < 1000 * kGone_s) {
     await seconds(1);
-    left = await spooled(ben, Number(oldMap.split("/")[0]));
+    const ids = await spooled(ben, Number(oldMap.split("/")[0]));
+    left = ids.filter((id) => id.includes("#"));
+    anchors = ids.filter((id) => id.startsWith("anchor"));
   }
   check("Ben's keyframes wait in his browser", left.length >= kLeft, left.length);
+  check("with his anchor", anchors.length === 1, anchors.length);
   await kill(ben);
   await seconds(kGone_s - (Date.now() - cut) / 1000);
   const hint = await anna.evaluate(() => document.getElementById("hint").textContent);
@@ -89,6 +101,7 @@ await run(async () => {
   check("the server has all of Anna's map", ofAnna.isWhole && ofAnna.ids.length > 20, `${ofAnna.ids.length} keyframes`);
   const ofOldMap = keyframesOf(server, oldMap);
   check("and of Ben's old one, also what waited", ofOldMap.isWhole && left.every((id) => ofOldMap.ids.includes(id)), `${ofOldMap.ids.length} keyframes`);
+  check("and the anchor in it", anchorsOf(server, oldMap).includes("kettle"), anchorsOf(server, oldMap));
   const { map, fused } = await again.evaluate(() => pangea.walk.pose);
   check("Ben's new map is another one, and fused", fused && map !== oldMap);
   await browser.close();
