@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
 """Tests that each thing has one word, that of the field: words that this project once invented must not be used. Also limits the words."""
 
+import os
 import re
+import subprocess
 import unittest
 from pathlib import Path
 
@@ -49,35 +51,46 @@ ALLOWED = {
 
 CODE = ["modules", "bench", "tests", "examples", "scripts", "sessions", "cmake", "packaging", "lcmtypes", "CMakeLists.txt"]
 CODE_SUFFIXES = {"", ".cc", ".h", ".py", ".ts", ".js", ".mjs", ".html", ".css", ".cmake", ".in", ".txt", ".yaml", ".conf", ".service", ".lcm"}
-SKIPPED = re.compile(r"^tests/fuzz/corpus/|^tests/words_test\.py$|node_modules/|package-lock\.json$|/build/|__pycache__")
+SKIPPED_FOLDERS = {"corpus", "node_modules", "build", "__pycache__"}
+SKIPPED = {"words_test.py", "package-lock.json"}
 
 DOCS = ["README.md", "docs", "modules", "bench", "examples", "lcmtypes", "logs", "sessions", "tests"]
 
 
 def files(roots, suffixes):
-    for root in roots:
-        path = ROOT / root
-        for file in [path] if path.is_file() else sorted(path.rglob("*")):
-            name = str(file.relative_to(ROOT))
-            if file.is_file() and not file.is_symlink() and file.suffix in suffixes and not SKIPPED.search(name):
-                yield name, file
+    for root in map(ROOT.joinpath, roots):
+        if root.is_file():
+            yield root
+        for folder, subfolders, names in os.walk(root):
+            subfolders[:] = sorted(set(subfolders) - SKIPPED_FOLDERS)
+            found = (Path(folder, name) for name in sorted(set(names) - SKIPPED))
+            yield from (file for file in found if file.suffix in suffixes and not file.is_symlink())
 
 
 def without(text, expressions):
     return re.sub("|".join(expressions), "", text)
 
 
+def files_with(expression, paths):
+    """The files that may have the expression: grep is ten times faster than Python."""
+    grep = subprocess.run(["grep", "-alP", expression, "--", *paths], env={**os.environ, "LC_ALL": "C"}, stdout=subprocess.PIPE, text=True)
+    if grep.returncode > 1:
+        raise RuntimeError(f"grep does not take {expression}")
+    return map(Path, grep.stdout.splitlines())
+
+
 def found(roots, suffixes):
     """Each word of the table that is found: file:line: the word, and its replacement."""
     out = []
-    words = [(re.compile(expression), say) for expression, say in WORDS]
-    for name, file in files(roots, suffixes):
-        try:
-            text = without(file.read_text(), FROZEN + ALLOWED.get(name, []))
-        except UnicodeDecodeError:
-            continue  # not a text file
-        for word, say in words:
-            out += [f"{name}:{text.count(chr(10), 0, hit.start()) + 1}: '{hit.group(0)}': say {say}" for hit in word.finditer(text)]
+    paths = list(files(roots, suffixes))
+    for expression, say in WORDS:
+        for file in files_with(expression, paths):
+            name = str(file.relative_to(ROOT))
+            try:
+                text = without(file.read_text(), FROZEN + ALLOWED.get(name, []))
+            except UnicodeDecodeError:
+                continue  # not a text file
+            out += [f"{name}:{text.count(chr(10), 0, hit.start()) + 1}: '{hit.group(0)}': say {say}" for hit in re.finditer(expression, text)]
     return sorted(out)
 
 
