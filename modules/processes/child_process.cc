@@ -92,6 +92,10 @@ void ChildProcess::Signal(int signal) {
 
 void ChildProcess::Stop(double grace_s) {
   Signal(SIGINT);
+  WaitForEnd(grace_s);
+}
+
+void ChildProcess::WaitForEnd(double grace_s) {
   const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(grace_s);
   while (running()) {
     if (std::chrono::steady_clock::now() > deadline) {

@@ -35,6 +35,8 @@ class ChildProcess {
   void Signal(int signal);
   // Sends SIGINT, and SIGKILL after the grace period.
   void Stop(double grace_s);
+  // For a process that has its signal already: waits, and sends SIGKILL after the grace period.
+  void WaitForEnd(double grace_s);
   // Last non-empty line of its output: usually the reason of its end.
   std::string LastLine() const;
   // For an ended process: "exit code 1: <its last line>", "signal 9: ...".

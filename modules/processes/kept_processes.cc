@@ -1,6 +1,7 @@
 #include "processes/kept_processes.h"
 
 #include <fmt/format.h>
+#include <signal.h>
 
 #include <algorithm>
 #include <stdexcept>
@@ -95,10 +96,17 @@ bool KeptProcesses::GivenUp(const std::string& name) const {
 
 void KeptProcesses::StopAll(double grace_s) {
   for (const bool loggers : {false, true}) {
-    for (auto kept = kept_.rbegin(); kept != kept_.rend(); ++kept) {
-      if (kept->child->name().starts_with("logger") == loggers) {
-        kept->child->Stop(grace_s);
+    std::vector<ChildProcess*> children;
+    for (Kept& kept : kept_) {
+      if (kept.child->name().starts_with("logger") == loggers) {
+        children.push_back(&*kept.child);
       }
+    }
+    for (ChildProcess* child : children) {
+      child->Signal(SIGINT);
+    }
+    for (ChildProcess* child : children) {
+      child->WaitForEnd(grace_s);
     }
   }
 }

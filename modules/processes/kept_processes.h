@@ -69,7 +69,7 @@ class KeptProcesses {
   std::vector<Revived> Revive();
   bool GivenUp(const std::string& name) const;
 
-  // Stops sources first and loggers last, so that no message is missed.
+  // Stops all at the same time, but the loggers last, so that no message is missed.
   void StopAll(double grace_s);
 
  private:
