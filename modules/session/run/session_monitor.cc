@@ -195,6 +195,11 @@ double SessionMonitor::QuietSeconds() const {
   return 1e-6 * static_cast<double>(WallUtime() - last_work_);
 }
 
+bool SessionMonitor::HaveReported(const std::vector<std::string>& processes) const {
+  return std::ranges::all_of(processes,
+                             [&](const std::string& name) { return statuses_.contains(name); });
+}
+
 bool SessionMonitor::Idle(const std::vector<std::string>& processes, double quiet_s) const {
   const int64_t now = WallUtime();
   return QuietSeconds() > quiet_s &&

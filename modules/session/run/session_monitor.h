@@ -56,6 +56,8 @@ class SessionMonitor {
   int constraints_refused() const { return refused_; }
   int num_results() const { return accepted_ + refused_; }
 
+  // Whether each of these processes has reported at all.
+  bool HaveReported(const std::vector<std::string>& processes) const;
   // Whether each of these processes has reported within the last 3 s that nothing is pending, and
   // the server bus has carried no message of work for `quiet_s`.
   bool Idle(const std::vector<std::string>& processes, double quiet_s) const;

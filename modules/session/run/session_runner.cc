@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <functional>
 #include <iterator>
 #include <map>
 #include <set>
@@ -103,15 +104,15 @@ class Runner {
   void StartServer() {
     processes_.StartServer(script_.options, options_.journal);
     server_names_.assign(std::begin(kServerProcesses), std::end(kServerProcesses));
-    WaitForServer();
+    WaitUntil("server processes", [this] { return monitor_.Idle(server_names_, 0); });
   }
 
-  void WaitForServer() {
+  void WaitUntil(const std::string& what, const std::function<bool()>& are_up) {
     const double deadline = Now() + kStartTimeout_s;
-    while (!monitor_.Idle(server_names_, 0) && !StopRequested()) {
+    while (!are_up() && !StopRequested()) {
       if (Now() > deadline) {
         throw std::runtime_error(
-            fmt::format("the server processes did not come up within {} s; their output is in {}",
+            fmt::format("the {} did not come up within {} s; their output is in {}", what,
                         kStartTimeout_s, (options_.out / "logs").string()));
       }
       monitor_.Handle(50);
@@ -127,6 +128,16 @@ class Runner {
       anchors_.Join(agent, &monitor_.agent_bus(agent.id));
       processes_.StartUplink(agent);
     }
+    // An uplink misses the first map of a player that is faster than its start.
+    WaitUntil("uplinks", [this] { return monitor_.HaveReported(UplinkNames()); });
+  }
+
+  std::vector<std::string> UplinkNames() const {
+    std::vector<std::string> names;
+    for (const AgentScript& agent : script_.agents) {
+      names.push_back(fmt::format("uplink_{}", agent.id));
+    }
+    return names;
   }
 
   // A killed player of stored keyframes starts again from the start; the uplink ignores repeats.
@@ -319,9 +330,7 @@ class Runner {
   // The processes that report when they have nothing to do.
   std::vector<std::string> Working() const {
     std::vector<std::string> names = server_names_;
-    for (const Player& player : players_) {
-      names.push_back(fmt::format("uplink_{}", player.script.id));
-    }
+    std::ranges::copy(UplinkNames(), std::back_inserter(names));
     std::erase_if(names,
                   [this](const std::string& name) { return processes_.kept().GivenUp(name); });
     return names;
