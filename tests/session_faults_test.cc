@@ -61,7 +61,8 @@ TEST(SessionFaults, AFaultAfterTheRecordingsDoesNotHappenAtRateMax) {
   fs::remove_all(folder);
 }
 
-// As on a full disk: no file grows beyond 300 kB. The server can never write the rest.
+// As on a full disk: no file grows beyond 300 kB. The server can never write the rest. The players
+// would wait 20 s for it, so they are told to end.
 TEST(SessionFaults, AFullDiskIsSaidAndCtrlCEndsTheWaiting) {
   const fs::path folder = FreshFolder("session_full_disk");
   const std::string keyframes = "keyframes: " PANGEA_SOURCE_DIR "/logs/two_walks/session.lcm";
@@ -69,10 +70,15 @@ TEST(SessionFaults, AFullDiskIsSaidAndCtrlCEndsTheWaiting) {
   const std::string said = (folder / "said.txt").string();
   const Outcome run = RunCommand(
       "trap '' XFSZ; ulimit -f $((300 * 1024 / 512)); pangea-session run " + file.string() +
-      " --rate max --out " + (folder / "out").string() + " >" + said + " 2>&1 & session=$!; " +
-      "for i in $(seq 400); do grep -q 'REFUSES WRITES' " + said + " && test $(grep -c 'done$' " +
+      " --rate max --out " + (folder / "out").string() + " >" + said +
+      " 2>&1 & session=$!; "
+      "players() { for child in $(cat /proc/$session/task/*/children); do"
+      " ! grep -q keyframe /proc/$child/comm || echo $child; done; }; "
+      "for i in $(seq 400); do grep -q 'agent_handler: THE DISK REFUSES WRITES' " +
       said +
-      ") -ge 2 && break; sleep 0.1; done; sleep 2; "
+      " && break; sleep 0.1; done; "
+      "for i in $(seq 400); do left=$(players); test -n \"$left\" || break; kill -INT $left; "
+      "sleep 0.1; done; sleep 1; "
       "kill -INT $session; for i in $(seq 150); do kill -0 $session || break; sleep 0.1; done; "
       "kill -9 $session && echo IT GOES ON; wait $session");
   EXPECT_EQ(run.exit_code, 1) << run.output;
