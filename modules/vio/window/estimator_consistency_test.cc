@@ -161,7 +161,7 @@ TEST(EstimatorConsistency, AStartWithARoughCalibrationIsBelievedNoMore) {
   options.imu_intrinsics_sigmas = 6;
   options.unknown_distortion = 0.07;
   NeesOfRides tilt;
-  for (const Ride& ride : ShortRides(20, options)) {
+  for (const Ride& ride : Starts(20, options)) {
     ASSERT_FALSE(ride.finished.empty()) << "seed " << ride.world.options().seed;
     const FinishedKeyframe& first = ride.finished.front();
     const auto e = ErrorOf(first, TruthOf(ride).front());

@@ -12,7 +12,9 @@ EstimatorOptions Options(const VioTestWorldOptions& world) {
   return options;
 }
 
-std::deque<Ride> MakeRides(uint64_t count, VioTestWorldOptions options, int frames) {
+// `only_starts`: a ride ends with its first finished keyframe.
+std::deque<Ride> MakeRides(uint64_t count, VioTestWorldOptions options, int frames,
+                           bool only_starts = false) {
   std::deque<Ride> rides;
   for (uint64_t seed = 1; seed <= count; ++seed) {
     options.seed = seed;
@@ -21,7 +23,9 @@ std::deque<Ride> MakeRides(uint64_t count, VioTestWorldOptions options, int fram
     options.focal_sigma = 0.001;
     options.centre_sigma = 0.001;
     Ride& ride = rides.emplace_back(options);
-    ride.Advance(frames);
+    for (int i = 0; i < frames && !(only_starts && !ride.finished.empty()); ++i) {
+      ride.Advance(1);
+    }
     ride.Flush();
   }
   return rides;
@@ -69,6 +73,10 @@ const std::deque<Ride>& TenRides() {
 
 std::deque<Ride> ShortRides(uint64_t count, const VioTestWorldOptions& options) {
   return MakeRides(count, options, 60);
+}
+
+std::deque<Ride> Starts(uint64_t count, const VioTestWorldOptions& options) {
+  return MakeRides(count, options, 60, true);
 }
 
 }  // namespace pangea::vio

@@ -37,5 +37,7 @@ const std::deque<Ride>& TenRides();
 // Rides of 6 s with these options. The IMU's scale factors and axes have errors drawn from the
 // sigmas in the noise, which the estimator knows.
 std::deque<Ride> ShortRides(uint64_t count, const VioTestWorldOptions& options);
+// The same rides, each up to its first finished keyframe.
+std::deque<Ride> Starts(uint64_t count, const VioTestWorldOptions& options);
 
 }  // namespace pangea::vio
