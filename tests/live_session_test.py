@@ -39,8 +39,9 @@ def main(programs, recording, work):
     try:
         wait_for(f"agent 1 is live until Ctrl-C: it takes CAMERA_1, IMU_1, IMAGE_1 on {BUS}", said)
         wait_for("agent 2 is live for 2 s", said)
-        subprocess.run([ROOT / "examples/sensor_source/euroc_source.py", "--agent", "1", "--recording", recording, "--bus", BUS],
-                       check=True, timeout=100, stdout=subprocess.DEVNULL)
+        source = subprocess.run([ROOT / "examples/sensor_source/euroc_source.py", "--agent", "1", "--recording", recording, "--bus", BUS],
+                                check=True, timeout=100, stdout=subprocess.PIPE, text=True)
+        assert "agent 1: tracking" in source.stdout, f"the source did not hear POSE_1: {source.stdout}"
         time.sleep(2)
         assert session.poll() is None, "it ended by itself"
         assert "no pose: no image came to the odometry" in (out / "logs" / "vio_2.txt").read_text(), "agent 2 was not ended"
