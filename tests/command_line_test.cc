@@ -248,14 +248,14 @@ TEST(Errors, OfAFolderThatCannotBeUsedBeginWithItsPath) {
             "pangea-session: " + too_long + "/session.lcm: cannot be used: File name too long\n");
 }
 
-// No server answers on this link.
+// No server answers on this link; the player, which would wait 20 s for one, is told to end.
 TEST(Uplink, SaysAtItsEndWhatIsLostWithoutASpool) {
   const Outcome outcome = RunCommand(
       "(rm -rf lost && mkdir -m 700 lost && pangea-agent-handler keygen --agent 1 --out lost/key "
       "&& "
-      "timeout -s INT 10 pangea-uplink --agent 1 --key lost/key --bus 'udpm://239.255.76.67:20013' "
+      "timeout -s INT 9 pangea-uplink --agent 1 --key lost/key --bus 'udpm://239.255.76.67:20013' "
       "--link 'udpm://239.255.76.68:20014' & sleep 2 && "
-      "pangea-keyframe-player --agent 1 --bus 'udpm://239.255.76.67:20013' "
+      "timeout -s INT 4 pangea-keyframe-player --agent 1 --bus 'udpm://239.255.76.67:20013' "
       "--keyframes " PANGEA_SOURCE_DIR "/logs/two_walks/session.lcm --rate 20; wait)");
   EXPECT_THAT(outcome.output,
               HasSubstr("keyframes: 0 acknowledged, 32 lost: --spool FOLDER keeps them"));
