@@ -161,7 +161,8 @@ TEST_F(ReportFilesTest, RubbishInTheLogIsCountedAndNamed) {
   log_->WriteBytes("KEYFRAME_xyz", rubbish);
   const json report = Report();
   EXPECT_EQ(report["agents"].size(), 2U);
-  EXPECT_THAT(markdown_, HasSubstr("1 messages on KEYFRAME_1 are refused and ignored; the first: "));
+  EXPECT_THAT(markdown_,
+              HasSubstr("1 messages on KEYFRAME_1 are refused and ignored; the first: "));
 }
 
 TEST_F(ReportFilesTest, ProcessesAndRestartsAreReported) {
