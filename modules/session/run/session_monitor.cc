@@ -200,6 +200,11 @@ bool SessionMonitor::HaveReported(const std::vector<std::string>& processes) con
                              [&](const std::string& name) { return statuses_.contains(name); });
 }
 
+int64_t SessionMonitor::Pending(const std::string& process) const {
+  const auto status = statuses_.find(process);
+  return status == statuses_.end() ? 0 : status->second.pending;
+}
+
 bool SessionMonitor::Idle(const std::vector<std::string>& processes, double quiet_s) const {
   const int64_t now = WallUtime();
   return QuietSeconds() > quiet_s &&

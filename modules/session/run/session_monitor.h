@@ -50,6 +50,8 @@ class SessionMonitor {
   Bus& agent_bus(int32_t id) { return *agent_buses_.at(id); }
   // Newest status of each process, by name, from any bus.
   const std::map<std::string, status_t>& statuses() const { return statuses_; }
+  // By its newest status; 0 if it never sent one.
+  int64_t Pending(const std::string& process) const;
   // CPU time of each process, over all its starts.
   std::map<std::string, double> CpuSeconds() const;
   int constraints_accepted() const { return accepted_; }
