@@ -49,6 +49,12 @@ PlacementResult Anchors::Try(const AnchorEdit& edit) const {
   return Place(edit, track == tracks_.end() ? kNoKeyframes : track->second, kHolds);
 }
 
+std::optional<Rigid3> Anchors::TryInGroup(const AnchorEdit& edit) const {
+  const PlacementResult result = Try(edit);
+  const auto* const placement = std::get_if<AnchorPlacement>(&result);
+  return placement == nullptr ? std::nullopt : std::optional(Position(*placement).T_map_anchor);
+}
+
 // If the new placement fails, the anchor keeps its old one.
 void Anchors::PlaceOrWait(const AnchorId& id) {
   const AnchorEdit& edit = *registry_.entries().at(id).place;

@@ -90,6 +90,8 @@ class Anchors {
   const TrackedKeyframe* NewestKeyframe(const MapId& map) const;
   // The placement that an edit would have, with the present maps.
   PlacementResult Try(const AnchorEdit& edit) const;
+  // The anchor's pose in its group's frame with that placement; empty if there is none.
+  std::optional<Rigid3> TryInGroup(const AnchorEdit& edit) const;
 
   size_t num_anchors() const { return registry_.entries().size() - registry_.num_deleted(); }
   size_t num_placed() const;

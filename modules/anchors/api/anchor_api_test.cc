@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
+#include <cmath>
+
 #include "anchors/api/anchor_api_test_world.h"
 
 namespace pangea {
@@ -64,6 +66,31 @@ TEST_F(AnchorApiTest, APoseOfAFusedGroupIsKeptByTheNearestKeyframe) {
   const auto refused = Ask("POST", "/v1/anchors", NewBody(1, p));
   EXPECT_EQ(refused->status, 400);
   EXPECT_EQ(refused->body["field"], "pose.group");
+}
+
+// Their odometry and the optimised map differ, by centimetres between the keyframes that hold it.
+TEST_F(AnchorApiTest, APoseOfAGroupIsWhereItWasGivenAndStaysAfterRoundTrips) {
+  MapState bent = State({0, 1}, 1);
+  for (KeyframePose& keyframe : bent.keyframes) {
+    keyframe.T_map_body.t.x() *= 1.05;
+    keyframe.T_map_body.q = YawRotation(0.004 * keyframe.id.seq) * keyframe.T_map_body.q;
+  }
+  anchors_.Take(bent);
+  const Eigen::Vector3d p = world_.T_hall_body({map(0), 10}) * Eigen::Vector3d(1.5, 0.3, 0);
+  const auto made = Ask("POST", "/v1/anchors", NewBody(0, p));
+  JournalNewest();
+  json anchor = made->body;
+  for (int i = 0; i < 8; ++i) {
+    EXPECT_LT((PositionOf(anchor) - p).norm(), 1e-5);
+    EXPECT_NEAR(std::abs(anchor["pose"]["orientation"][0].get<double>()), 1, 1e-9);
+    json pose = anchor["pose"];
+    pose["group"] = anchor["group"];
+    const auto put =
+        Ask("PUT", "/v1/anchors/" + anchor["id"].get<std::string>(), json{{"pose", pose}}.dump());
+    JournalNewest();
+    ASSERT_EQ(put->status, 200) << put->body;
+    anchor = put->body;
+  }
 }
 
 TEST_F(AnchorApiTest, AnAnchorByAKeyframeAndOneBehindAPixel) {
