@@ -105,6 +105,31 @@ serve_until both "grep -q 'posegraph: 2 maps in 1 groups' both/logs/posegraph.tx
   EXPECT_THAT(said, Not(HasSubstr("never")));
 }
 
+// Another site gets the name of a moved one; a process that is started again writes into the old.
+TEST_F(SiteProgram, AServerStaysInItsSiteWhenTheFolderIsMoved) {
+  ASSERT_EQ(Site(fmt::format("create {} {}", site, Buses())).exit_code, 0);
+  std::ofstream(folder / "fusion.yaml") << "{}\n";
+  std::ofstream(folder / "run.sh") << fmt::format(
+      R"sh(cd {}
+handler() {{ pgrep -P $server -f pangea-agent-handler; }}
+pangea-server --site hall --options fusion=fusion.yaml & server=$!
+sleep 3; killed=$(handler)
+mv hall moved; pangea-site create hall {}
+kill -9 $killed
+for i in $(seq 100); do sleep 0.1; [ "$(handler)" != $killed ] && [ -n "$(handler)" ] && break; done
+sleep 1
+echo journal $(readlink /proc/$(handler)/fd/* | grep journal.lcm)
+kill -INT $server; wait $server; echo server ended $?
+ls hall hall/logs
+)sh",
+      folder.string(), Buses());
+  const std::string said = RunCommand("bash " + (folder / "run.sh").string()).output;
+  EXPECT_THAT(said, ContainsRegex("journal [^ ]*/moved/journal.lcm\n"));
+  EXPECT_THAT(said, HasSubstr("--options " + (folder / "fusion.yaml").string()));
+  EXPECT_THAT(said, HasSubstr("server ended 0\nhall:\nkeys\nlogs\noptions\nsite.yaml\n\n"
+                              "hall/logs:\n"));
+}
+
 TEST_F(SiteProgram, ExportsTrajectoriesAndPoints) {
   MakeSiteOfWalks();
   const Outcome outcome = Site(fmt::format("export {} --out {}/out", site, folder.string()));

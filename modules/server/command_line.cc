@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <optional>
 #include <stdexcept>
 
@@ -16,6 +17,8 @@
 
 namespace pangea::server {
 namespace {
+
+namespace fs = std::filesystem;
 
 // Differs from a server's bus; messages between a worker's verifiers stay on this host.
 constexpr char kWorkerBusUrl[] = "udpm://239.255.76.67:7701?ttl=0&recv_buf_size=4194304";
@@ -98,10 +101,28 @@ void AddArguments(CLI::App& app, Arguments* arguments) {
   AddWeb(app, site, &options);
 }
 
-// Takes the values that the command line does not give from the site.
-void UseSite(const site::Site& site, Arguments* arguments) {
+// Relative paths on the command line are not relative to the site.
+void MakePathsAbsolute(Arguments* arguments) {
+  for (std::string& text : arguments->option_files) {
+    if (const size_t equals = text.find('='); equals != std::string::npos) {
+      text.replace(equals + 1, std::string::npos, fs::absolute(text.substr(equals + 1)));
+    }
+  }
+  ClusterOptions& cluster = arguments->options.cluster;
+  for (fs::path* path : {&cluster.ca, &cluster.credentials}) {
+    *path = path->empty() ? *path : fs::absolute(*path);
+  }
+}
+
+// Takes the values that the command line does not give from the site. Works in its folder, and
+// names its files relative to it: if somebody moves the locked folder, the processes stay in it,
+// and write into no other one that gets its name.
+void UseSite(site::Site site, Arguments* arguments) {
+  MakePathsAbsolute(arguments);
+  fs::current_path(site.folder);
+  site.folder = "";
   ServerSetup& options = arguments->options;
-  options.site = site.folder;
+  options.site = ".";
   options.journal = site.journal();
   options.keys = site.keys();
   options.logs = site.logs();

@@ -193,7 +193,7 @@ int Serve(const ServerSetup& options) {
   KeptProcesses kept(options.logs);
   if (is_core) {
     Say(fmt::format("stands by until this host has the site; see {}/bridge.txt",
-                    options.logs.string()));
+                    fs::absolute(options.logs).string()));
     if (!StandBy(options.cluster, options.journal, options.logs, &checkpoints)) {
       return 0;
     }
@@ -206,7 +206,7 @@ int Serve(const ServerSetup& options) {
   if (options.phone_port) {
     Start(&kept, kGateway, GatewayCommand(options));
   }
-  Say(fmt::format("what they say is in {}; Ctrl-C ends them", options.logs.string()));
+  Say(fmt::format("what they say is in {}; Ctrl-C ends them", fs::absolute(options.logs).string()));
   const bool given_up = KeepAlive(&kept, [&] { checkpoints.Tick(SteadySeconds()); });
   Say("brings the checkpoints up to date; another Ctrl-C leaves them as they are");
   checkpoints.Finish();
@@ -222,7 +222,7 @@ int ServeAsWorker(const ServerSetup& options) {
   for (const char* verifier : kVerifiers) {
     Start(&kept, verifier, Command(verifier, options));
   }
-  Say(fmt::format("what they say is in {}; Ctrl-C ends them", options.logs.string()));
+  Say(fmt::format("what they say is in {}; Ctrl-C ends them", fs::absolute(options.logs).string()));
   const bool given_up = KeepAlive(&kept, [] {});
   return given_up ? 1 : 0;
 }
