@@ -193,6 +193,7 @@ class ArchiveInTheMaking {
       throw std::runtime_error(
           fmt::format("{}: exists; give another name, nothing is overwritten", to.string()));
     }
+    RequireOutsideSites(to);
   }
   ~ArchiveInTheMaking() {
     std::error_code ignored;

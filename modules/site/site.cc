@@ -67,13 +67,11 @@ void CheckCanBecomeSite(const fs::path& folder) {
   if (!fs::exists(folder)) {
     return;
   }
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    if (!IsOurs(entry.path().filename())) {
-      throw std::runtime_error(
-          fmt::format("{}: is a folder without site.yaml, and '{}' in it is nothing of a site's; "
-                      "name a new folder, or an empty one",
-                      folder.string(), entry.path().filename().string()));
-    }
+  if (const std::string foreign = ForeignFile(folder); !foreign.empty()) {
+    throw std::runtime_error(
+        fmt::format("{}: is a folder without site.yaml, and '{}' in it is nothing of a site's; "
+                    "name a new folder, or an empty one",
+                    folder.string(), foreign));
   }
 }
 
@@ -139,6 +137,28 @@ SiteDescription NewDescription(const std::string& name) {
   return description;
 }
 
+std::string ForeignFile(const fs::path& folder) {
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    if (std::string name = entry.path().filename(); !IsOurs(name)) {
+      return name;
+    }
+  }
+  return "";
+}
+
+void RequireOutsideSites(const fs::path& path) {
+  for (fs::path at = fs::weakly_canonical(fs::absolute(WithoutSlash(path)));
+       at.has_relative_path();) {
+    at = at.parent_path();
+    std::error_code ignored;
+    if (fs::exists(at / "site.yaml", ignored)) {
+      throw std::runtime_error(
+          fmt::format("{}: is inside the site {}, and would be deleted with it; give another place",
+                      path.string(), at.string()));
+    }
+  }
+}
+
 Site ReadSite(const fs::path& folder) {
   Site site{folder, {}};
   if (!fs::exists(site.file())) {
@@ -164,6 +184,7 @@ Site CreateSite(const fs::path& folder, const SiteDescription& description) {
         fmt::format("{}: is a site already; give another folder", folder.string()));
   }
   CheckCanBecomeSite(folder);
+  RequireOutsideSites(folder);
   fs::create_directories(folder);
   WriteSite(site);
   return site;
@@ -183,6 +204,7 @@ SiteInTheMaking::SiteInTheMaking(const fs::path& folder)
     throw std::runtime_error(
         fmt::format("{}: exists; give another name, nothing is overwritten", target_.string()));
   }
+  RequireOutsideSites(target_);
   fs::create_directories(staging_);
 }
 

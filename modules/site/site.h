@@ -56,12 +56,18 @@ std::string NameOfFolder(const std::filesystem::path& folder);
 // A description with the present time and the default buses.
 SiteDescription NewDescription(const std::string& name);
 
+// The name of a file in the folder that is nothing of a site's; empty if there is none.
+std::string ForeignFile(const std::filesystem::path& folder);
+// Throws std::runtime_error if a new file or folder would be inside a site.
+void RequireOutsideSites(const std::filesystem::path& path);
+
 // Throws std::runtime_error with file, field and correction if there is no site or its site.yaml is
 // invalid.
 Site ReadSite(const std::filesystem::path& folder);
 
 // Creates a site. The folder is created; an existing one is used if it has only files of a site.
-// site.yaml is written last: a folder without it is not a site yet. Throws std::runtime_error.
+// site.yaml is written last: a folder without it is not a site yet. Throws std::runtime_error, also
+// if the folder is inside a site.
 Site CreateSite(const std::filesystem::path& folder, const SiteDescription& description);
 
 // ReadSite, or, if there is no site, CreateSite with the folder's name.
@@ -71,7 +77,7 @@ Site OpenSite(const std::filesystem::path& folder);
 // Without Commit it is removed.
 class SiteInTheMaking {
  public:
-  // Throws std::runtime_error if `folder` exists and is not an empty folder.
+  // Throws std::runtime_error if `folder` exists and is not an empty folder, or is inside a site.
   explicit SiteInTheMaking(const std::filesystem::path& folder);
   ~SiteInTheMaking();
   SiteInTheMaking(const SiteInTheMaking&) = delete;

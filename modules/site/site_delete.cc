@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <stdexcept>
+
 #include "files/disk_io.h"
 #include "files/make_folder.h"
 
@@ -26,6 +28,11 @@ fs::path NameFor(const fs::path& folder) {
 fs::path Delete(const Site& site, bool now) {
   const SiteLock lock(site);
   const fs::path folder = WithoutSlash(fs::absolute(site.folder));
+  if (const std::string foreign = ForeignFile(folder); now && !foreign.empty()) {
+    throw std::runtime_error(fmt::format(
+        "{}: '{}' in it is nothing of a site's: move that away, or delete without --now",
+        site.folder.string(), foreign));
+  }
   fs::path away = NameFor(folder);
   fs::rename(folder, away);
   SyncToDisk(folder.parent_path());

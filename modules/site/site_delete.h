@@ -8,7 +8,7 @@ namespace pangea::site {
 
 // Deletes a site: renames its folder to <folder>.deleted-<UTC time> and returns that path. With
 // `now` the folder is removed too, and the path is empty. Throws std::runtime_error if a server
-// runs.
+// runs, or if files that are nothing of the site's would be removed.
 std::filesystem::path Delete(const Site& site, bool now);
 
 }  // namespace pangea::site

@@ -49,6 +49,7 @@ std::vector<std::string> ExportSite(const Site& site, const fs::path& out, LogRe
     throw std::runtime_error(
         fmt::format("--out {}: exists; give a new folder, nothing is overwritten", out.string()));
   }
+  RequireOutsideSites(out);
   NewFolder folder(out);
   const fs::path replayed = out / "replay.lcm";
   const LoggedOptions logged = ReadLoggedOptions({site.journal()}, readings);

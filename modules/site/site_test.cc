@@ -10,7 +10,9 @@
 #include "checkpoint/checkpoint_file.h"
 #include "messages/encoding.h"
 #include "messages/messages.h"
+#include "site/backup.h"
 #include "site/site_delete.h"
+#include "site/site_export.h"
 #include "site/site_info.h"
 #include "site/site_test_world.h"
 
@@ -66,6 +68,37 @@ TEST(Site, RefusesAFolderOfSomethingElse) {
   EXPECT_FALSE(fs::exists(folder / "keys"));
   EXPECT_THAT(WhyNot([&] { OpenSite(folder / "thesis.tex"); }), HasSubstr("is no folder"));
   EXPECT_THAT(WhyNot([&] { ReadSite(folder); }), HasSubstr("it has no site.yaml"));
+}
+
+// Whoever deletes the outer site would delete it too.
+TEST(Site, RefusesWhatIsInsideASite) {
+  const fs::path folder = FreshFolder("inside");
+  const Site hall = MakeSite(folder / "hall", {});
+  fs::create_directory_symlink(hall.folder, folder / "link");
+  const std::string inside = "is inside the site " + hall.folder.string();
+  for (const char* name :
+       {"hall/annex", "hall/recordings/annex", "hall/../hall/annex", "link/annex", "hall/annex/"}) {
+    EXPECT_THAT(WhyNot([&] { CreateSite(folder / name, NewDescription("annex")); }),
+                HasSubstr(inside))
+        << name;
+    EXPECT_THAT(WhyNot([&] { SiteInTheMaking(folder / name); }), HasSubstr(inside)) << name;
+  }
+  EXPECT_THAT(WhyNot([&] { BackUp(hall, hall.folder / "copy.tar.zst", false); }),
+              HasSubstr(inside));
+  EXPECT_THAT(WhyNot([&] { ExportSite(hall, hall.folder / "out", nullptr); }), HasSubstr(inside));
+  EXPECT_EQ(ForeignFile(hall.folder), "");
+  EXPECT_NO_THROW(CreateSite(folder / "annex", NewDescription("annex")));
+}
+
+TEST(Site, IsNotRemovedWithFilesOfOthers) {
+  const Site site = MakeSite(FreshFolder("foreign") / "hall", {});
+  std::ofstream(site.folder / "thesis.tex") << "x";
+  EXPECT_THAT(WhyNot([&] { Delete(site, true); }),
+              HasSubstr("'thesis.tex' in it is nothing of a site's"));
+  EXPECT_TRUE(fs::exists(site.folder / "thesis.tex"));
+  fs::remove(site.folder / "thesis.tex");
+  EXPECT_EQ(Delete(site, true), "");
+  EXPECT_FALSE(fs::exists(site.folder));
 }
 
 TEST(Site, NamesFileAndFieldOfWhatIsWrong) {
