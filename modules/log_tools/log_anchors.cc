@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <limits>
 #include <nlohmann/json.hpp>
 #include <utility>
 #include <vector>
@@ -22,6 +21,8 @@ using nlohmann::ordered_json;
 
 class Collector {
  public:
+  explicit Collector(size_t max_anchors) : registry_(max_anchors) {}
+
   void Take(const LogEvent& event) {
     if (event.channel == channels::kAnchorEdit) {
       ++logged_.num_edits;
@@ -67,8 +68,7 @@ class Collector {
   }
 
   LoggedAnchors logged_;
-  // The size of the file bounds the number
-  AnchorRegistry registry_{std::numeric_limits<size_t>::max()};
+  AnchorRegistry registry_;
   std::map<AnchorId, AnchorState> states_;
 };
 
@@ -168,8 +168,8 @@ std::string Row(const AnchorId& id, const LoggedAnchor& anchor) {
 
 }  // namespace
 
-LoggedAnchors ReadAnchors(const std::string& log, LogReadings* readings) {
-  Collector collector;
+LoggedAnchors ReadAnchors(const std::string& log, LogReadings* readings, size_t max_anchors) {
+  Collector collector(max_anchors);
   ReadLog(
       log, [&collector](const LogEvent& event) { collector.Take(event); }, readings);
   return collector.Finish();

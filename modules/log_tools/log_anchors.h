@@ -3,6 +3,7 @@
 // The anchors at the end of a log: ANCHOR has their poses, ANCHOR_EDIT their edits and editors. A
 // journal (journal.lcm) has only edits; a replay of it has both.
 
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -25,15 +26,17 @@ struct LoggedAnchor {
 struct LoggedAnchors {
   std::map<AnchorId, LoggedAnchor> anchors;
   int64_t num_edits = 0, num_states = 0;  // messages
-  int64_t num_refused = 0;                // invalid messages, and edits that the key does not allow
+  int64_t num_refused = 0;                // invalid messages, and edits that were refused
 
   // Whether the log has edits but no poses of anchors.
   bool edits_only() const { return num_edits > 0 && num_states == 0; }
 };
 
 // Damaged parts of the log are reported in `readings` (log_reader.h). Throws std::runtime_error if
-// it cannot be opened or is not a log.
-LoggedAnchors ReadAnchors(const std::string& log, LogReadings* readings = nullptr);
+// it cannot be opened or is not a log. `max_anchors`: the server's option; an edit that makes more
+// is refused.
+LoggedAnchors ReadAnchors(const std::string& log, LogReadings* readings = nullptr,
+                          size_t max_anchors = std::numeric_limits<size_t>::max());
 
 // Standard deviation of the position, metres: root mean square over its axes.
 double RmsPositionSigma(const AnchorState& state);

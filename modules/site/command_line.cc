@@ -12,7 +12,6 @@
 #include "bus/process.h"
 #include "log_file/log_reading.h"
 #include "options/command_line.h"
-#include "options/yaml_options.h"
 #include "site/backup.h"
 #include "site/compact.h"
 #include "site/merge.h"
@@ -20,6 +19,7 @@
 #include "site/site_delete.h"
 #include "site/site_export.h"
 #include "site/site_info.h"
+#include "site/site_options.h"
 
 namespace pangea::site {
 namespace {
@@ -112,21 +112,11 @@ void RunInfo(const Arguments& arguments) {
   *arguments.lost = !info.damage().whole();
 }
 
-ThinningOptions ReadThinningOptions(const Site& site) {
-  ThinningOptions options;
-  YamlOptions yaml;
-  options.Visit(yaml);
-  if (const fs::path file = site.options() / "thinning.yaml"; fs::exists(file)) {
-    yaml.ReadFile(file);
-  }
-  return options;
-}
-
 void RunCompact(const Arguments& arguments) {
   const Site site = ReadSite(arguments.site);
   std::optional<ThinJournal> thin;
   if (arguments.thin) {
-    thin = {ReadThinningOptions(site), WallUtime()};
+    thin = {ReadOptions<ThinningOptions>(site, "thinning"), WallUtime()};
   }
   const CompactSummary summary = Compact(site, thin);
   *arguments.lost = summary.damaged;

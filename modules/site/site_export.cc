@@ -61,7 +61,7 @@ std::vector<std::string> ExportSite(const Site& site, const fs::path& out, LogRe
   std::vector<std::string> files = ExportTum(replayed, out);
   files.push_back(out / "map.ply");
   ExportPly(replayed, files.back());
-  const LoggedAnchors anchors = ReadAnchors(replayed);
+  const LoggedAnchors anchors = ReadAnchors(replayed, nullptr, logged.options.anchors.max_anchors);
   if (!anchors.anchors.empty()) {
     files.push_back(out / "anchors.json");
     WriteTextFile(files.back(), ToJson(anchors));

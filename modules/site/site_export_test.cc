@@ -18,7 +18,9 @@ TEST(SiteExport, HasTheAnchorsAmongThePoints) {
   keyframe_t first{};
   ASSERT_TRUE(DecodeMessage(events.front().data, &first));
   const KeyframeId keyframe{*Parse(first.id.map).value, 10};
+  events.insert(events.begin(), OptionsEvent("anchors", "max_anchors: 1\n"));
   events.push_back(PlacementEvent({1, 5}, 0, keyframe, {2, 0, 0}));
+  events.push_back(PlacementEvent({1, 6}, 1, keyframe, {3, 0, 0}));  // was refused
   const std::filesystem::path folder = FreshFolder("export");
   const Site site = MakeSite(folder / "hall", events);
   LogReadings readings;

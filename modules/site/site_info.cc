@@ -5,16 +5,17 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <limits>
 #include <stdexcept>
 
 #include "anchors/anchor_registry.h"
+#include "anchors/anchors.h"
 #include "checkpoint/checkpoint_file.h"
 #include "log_file/log_reader.h"
 #include "messages/anchor_messages.h"
 #include "messages/channels.h"
 #include "messages/encoding.h"
 #include "messages/messages.h"
+#include "site/site_options.h"
 
 namespace pangea::site {
 namespace {
@@ -35,7 +36,8 @@ int64_t BytesIn(const fs::path& folder) {
 // Collects the counts of SiteInfo from the events.
 class Counter {
  public:
-  explicit Counter(SiteInfo* info) : info_(info) {}
+  Counter(int max_anchors, SiteInfo* info)
+      : info_(info), registry_(static_cast<size_t>(max_anchors)) {}
 
   void Take(const LogEvent& event) {
     info_->first_utime = std::min(info_->first_utime.value_or(event.utime), event.utime);
@@ -82,7 +84,7 @@ class Counter {
   }
 
   SiteInfo* info_;
-  AnchorRegistry registry_{std::numeric_limits<size_t>::max()};
+  AnchorRegistry registry_;
 };
 
 std::string Megabytes(int64_t bytes) {
@@ -152,7 +154,7 @@ SiteInfo ReadInfo(const Site& site) {
   info.bytes = BytesIn(site.folder);
   info.free_bytes = static_cast<int64_t>(fs::space(site.folder).available);
   if (fs::exists(site.journal())) {
-    Counter counter(&info);
+    Counter counter(ReadOptions<AnchorsOptions>(site, "anchors").max_anchors, &info);
     LogReadings readings;
     ReadLog(
         site.journal(), [&counter](const LogEvent& event) { counter.Take(event); }, &readings);

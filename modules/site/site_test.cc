@@ -177,6 +177,15 @@ TEST(SiteInfo, CountsWhatIsThere) {
   EXPECT_THAT(ListSites(site.folder.parent_path()), HasSubstr("not in use"));
 }
 
+// The server has refused the others.
+TEST(SiteInfo, CountsNoMoreAnchorsThanThereMayBe) {
+  const Site site = MakeSite(FreshFolder("info_anchors") / "hall",
+                             {EditEvent({1, 7}, 1, 0), EditEvent({1, 8}, 1, 1)});
+  EXPECT_EQ(ReadInfo(site).anchors, 2);
+  std::ofstream(site.options() / "anchors.yaml") << "max_anchors: 1\n";
+  EXPECT_EQ(ReadInfo(site).anchors, 1);
+}
+
 // Those that were thinned away are not lost.
 TEST(SiteInfo, CallsOnlyKeyframesMissingThatNoEdgeLeadsOver) {
   std::vector<StoredEvent> events;

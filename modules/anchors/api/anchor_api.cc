@@ -211,9 +211,11 @@ void AnchorApi::Make(const web::WebRequest& request, const Reply& reply) {
   if (const auto* const bad = std::get_if<BadField>(&parsed)) {
     return reply(Error(*bad));
   }
-  if (anchors_.num_anchors() >= max_anchors_) {
-    return reply(Error(409, fmt::format("there are {} anchors, max_anchors: delete some",
-                                        anchors_.num_anchors())));
+  // The journal would keep an edit that is refused later, and a server with another limit take it.
+  const size_t num_anchors = anchors_.num_anchors() + NumPendingNew();
+  if (num_anchors >= max_anchors_) {
+    return reply(
+        Error(409, fmt::format("there are {} anchors, max_anchors: delete some", num_anchors)));
   }
   const auto& body = std::get<EditBody>(parsed);
   AnchorEdit edit;
@@ -224,6 +226,11 @@ void AnchorApi::Make(const web::WebRequest& request, const Reply& reply) {
   }
   edit.anchor = NewId();
   Submit(std::move(edit), reply);
+}
+
+size_t AnchorApi::NumPendingNew() const {
+  return static_cast<size_t>(std::ranges::count_if(
+      pending_, [](const Pending& pending) { return pending.edit.revision == 1; }));
 }
 
 void AnchorApi::Change(const web::WebRequest& request, const ListedAnchor& anchor,

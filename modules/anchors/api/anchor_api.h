@@ -61,6 +61,8 @@ class AnchorApi : public web::WebSite {
   void AnswerAnchors(const web::WebRequest& request, const std::string& query, const Reply& reply);
   void AnswerAnchor(const web::WebRequest& request, const Path& path, const Reply& reply);
   void Make(const web::WebRequest& request, const Reply& reply);
+  // Anchors that are requested, and not in the journal yet.
+  size_t NumPendingNew() const;
   // Changes or deletes an existing anchor.
   void Change(const web::WebRequest& request, const ListedAnchor& anchor, const Reply& reply);
   web::WebAnswer List(const std::string& query) const;

@@ -167,6 +167,22 @@ TEST_F(AnchorApiTest, WhatTheJournalsEditIsRefusedForIsSaid) {
   EXPECT_THAT(heard->body.value("error", ""), HasSubstr("max_anchors"));
 }
 
+TEST_F(AnchorApiTest, NoMoreAreRequestedThanThereMayBe) {
+  AnchorsOptions options;
+  options.max_anchors = 3;
+  AnchorApi api(anchors_, options, [this](const AnchorEdit& edit) { requested_.push_back(edit); });
+  api.Tick(now_utime_, true);
+  Make();
+  requested_.clear();
+  std::vector<int> refused;
+  for (int i = 0; i < 5; ++i) {
+    api.Answer({"POST", "/v1/anchors", "localhost", "", NewBody(0, NearAgent())},
+               [&](const web::WebAnswer& answer) { refused.push_back(answer.status); });
+  }
+  EXPECT_EQ(requested_.size(), 2u);
+  EXPECT_EQ(refused, (std::vector<int>{409, 409, 409}));
+}
+
 TEST_F(AnchorApiTest, EditsUnderWayAreBounded) {
   std::vector<std::shared_ptr<Heard>> heard;
   for (size_t i = 0; i <= AnchorApi::kMaxPending; ++i) {
