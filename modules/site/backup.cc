@@ -75,6 +75,14 @@ std::vector<Source> SourcesOf(const Site& site, bool with_keys, const WholePart&
   return sources;
 }
 
+// What the journal has behind its whole part: a running server is still writing it, else it is
+// lost.
+int64_t LostBehind(const WholePart& journal, const Site& site) {
+  return UserOf(site) || !fs::exists(site.journal())
+             ? 0
+             : static_cast<int64_t>(fs::file_size(site.journal())) - journal.bytes;
+}
+
 uint32_t CopyFile(const Source& source, const Target& target) {
   const int fd = open(source.path.c_str(), O_RDONLY | O_CLOEXEC);
   if (fd < 0) {
@@ -249,16 +257,20 @@ BackupSummary BackUp(const Site& site, const fs::path& to, bool with_keys) {
   }
   const WholePart journal = FindWholePart(site.journal());
   const std::vector<Source> sources = SourcesOf(site, with_keys, journal);
-  BackupSummary summary{journal.bytes, journal.events, journal.lost_bytes, 0};
+  BackupSummary summary{journal.bytes, journal.events,
+                        journal.lost_bytes + LostBehind(journal, site), 0};
   summary.bytes = IsArchive(to) ? WriteArchive(sources, to) : WriteFolder(sources, site, to);
   return summary;
 }
 
 BackupSummary Restore(const fs::path& from, const fs::path& folder) {
   SiteInTheMaking made(folder);
+  int64_t lost_bytes = 0;
   if (fs::is_directory(from)) {
     const Site site = ReadSite(from);
-    CopyToFolder(SourcesOf(site, true, FindWholePart(site.journal())), made.folder());
+    const WholePart journal = FindWholePart(site.journal());
+    lost_bytes = LostBehind(journal, site);
+    CopyToFolder(SourcesOf(site, true, journal), made.folder());
   } else {
     std::unique_ptr<NewFile> file;
     ReadArchive(from, {[&](const Source& source) {
@@ -270,7 +282,7 @@ BackupSummary Restore(const fs::path& from, const fs::path& folder) {
   const Site restored = ReadSite(made.folder());
   const WholePart journal = FindWholePart(restored.journal());
   made.Commit(restored.description);
-  return {journal.bytes, journal.events, journal.lost_bytes, journal.bytes};
+  return {journal.bytes, journal.events, journal.lost_bytes + lost_bytes, journal.bytes};
 }
 
 }  // namespace pangea::site

@@ -13,7 +13,7 @@ namespace pangea::site {
 struct BackupSummary {
   int64_t journal_bytes = 0;
   int64_t events = 0;
-  int64_t lost_bytes = 0;  // damaged, in the journal itself
+  int64_t lost_bytes = 0;  // of the journal itself: damaged, or incomplete at its end
   int64_t bytes = 0;       // size of the backup
 };
 

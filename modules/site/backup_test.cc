@@ -92,8 +92,12 @@ TEST_P(BackupTest, EndsBehindTheLastGroupThatIsWrittenToItsEnd) {
   const std::vector<StoredEvent> events = EventsOf(site);
   // Cuts the last CHECKSUMS event
   fs::resize_file(site.journal(), fs::file_size(site.journal()) - 5);
-  BackUp(site, copy, false);
-  Restore(copy, folder / "again");
+  const auto bytes = static_cast<int64_t>(fs::file_size(site.journal()));
+  const BackupSummary summary = BackUp(site, copy, false);
+  EXPECT_GT(summary.lost_bytes, 0);
+  EXPECT_EQ(summary.journal_bytes + summary.lost_bytes, bytes);
+  EXPECT_EQ(Restore(copy, folder / "again").lost_bytes, 0);
+  EXPECT_EQ(Restore(site.folder, folder / "restored").lost_bytes, summary.lost_bytes);
   const std::vector<StoredEvent> kept = EventsOf(ReadSite(folder / "again"));
   ASSERT_FALSE(kept.empty());
   EXPECT_EQ(kept.size(), events.size() / 10 * 10);  // a group has ten events
@@ -114,7 +118,8 @@ TEST_P(BackupTest, IsConsistentWhileTheJournalGrows) {
   for (int i = 0; i < 5; ++i) {
     const fs::path again = folder / ("again_" + std::to_string(i));
     const fs::path to = folder / (std::to_string(i) + GetParam());
-    BackUp(site, to, false);
+    const SiteLock lock(site);  // a server has it
+    EXPECT_EQ(BackUp(site, to, false).lost_bytes, 0);
     Restore(to, again);
     EXPECT_EQ(FoundAtOpening(ReadSite(again)), "");
   }

@@ -41,8 +41,8 @@ void NoteLoss(const fs::path& of, int64_t bytes, const Arguments& arguments) {
   if (bytes > 0) {
     *arguments.lost = true;
     std::cerr << fmt::format(
-        "pangea-site: {}: {} bytes of it are damaged and lost; all else is there\n", of.string(),
-        bytes);
+        "pangea-site: {}: {} bytes of it are damaged or incomplete, and lost; all else is there\n",
+        of.string(), bytes);
   }
 }
 

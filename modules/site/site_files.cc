@@ -88,6 +88,7 @@ WholePart FindWholePart(const fs::path& journal) {
   CheckedScan scan(file.fd());
   Progress progress("checking " + journal.string());
   WholePart read, checked;
+  int64_t lost_bytes = 0;
   bool has_checksums = false;
   while (const CheckedScan::Piece* piece = scan.Next()) {
     if (piece->kind == LogPiece::Kind::kTornTail) {
@@ -96,7 +97,8 @@ WholePart FindWholePart(const fs::path& journal) {
     progress.Update(piece->end() / kMegabyte, scan.file_bytes() / kMegabyte, "MB");
     const bool whole = piece->kind == LogPiece::Kind::kEvent && !FillsDamage(*piece);
     read.events += whole ? 1 : 0;
-    read.lost_bytes += whole ? 0 : piece->bytes;
+    lost_bytes += whole ? 0 : piece->bytes;
+    read.lost_bytes = whole ? lost_bytes : read.lost_bytes;
     read.bytes = whole ? piece->end() : read.bytes;
     if (whole && ChecksumsOf(piece->whole)) {
       has_checksums = true;

@@ -28,7 +28,7 @@ bool IsFileOfSite(const std::string& name);
 struct WholePart {
   int64_t bytes = 0;       // from the start to the end of the last complete group
   int64_t events = 0;      // complete events in it, including CHECKSUMS
-  int64_t lost_bytes = 0;  // of damaged parts
+  int64_t lost_bytes = 0;  // of damaged parts in it
 };
 
 // The complete part of a journal: up to its last CHECKSUMS or, if it has none, its last complete
