@@ -93,6 +93,12 @@ std::vector<MapId> Anchors::AgentMaps() const {
       maps.push_back(map);
     }
   }
+  for (MapId& map : maps) {
+    const auto current = current_maps_.find(map.agent_id);
+    if (current != current_maps_.end() && tracks_.contains(current->second)) {
+      map = current->second;
+    }
+  }
   return maps;
 }
 

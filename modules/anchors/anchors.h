@@ -58,7 +58,11 @@ class Anchors {
   void Take(const MapState& state);
   void Take(const Correction& correction);
 
-  // The newest map of each agent.
+  // The map that an agent's odometry is in, as its poses say. Map ids do not: the agent's clock may
+  // have been set back.
+  void SetCurrentMap(const MapId& map) { current_maps_[map.agent_id] = map; }
+
+  // The current map of each agent, or, if that has no keyframes yet, the one with the highest id.
   std::vector<MapId> AgentMaps() const;
   // The anchors near the map's newest keyframe, nearest first; then those that are gone for it:
   // deleted ones (the newest max_near), and anchors in `told` that are no longer in its group.
@@ -128,6 +132,7 @@ class Anchors {
   std::map<MapId, std::set<AnchorId>> waiting_;  // by map: anchors that wait for a keyframe
   GroupStates<PosedGroup> groups_;
   std::map<MapId, Correction> corrections_;
+  std::map<int32_t, MapId> current_maps_;  // by agent
   std::vector<std::string> not_placed_;
   // Cache; empty after a change.
   mutable std::optional<std::map<AnchorId, InGroup>> positions_;

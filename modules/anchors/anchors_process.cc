@@ -52,6 +52,7 @@ void AnchorsProcess::OnPose(const pose_t& message) {
   if (!map.value || !T_odom_body.value) {
     return node_.Refuse("pose: invalid map or pose");
   }
+  anchors_.SetCurrentMap(*map.value);
   other_agents_.Take(*map.value, *T_odom_body.value, now_utime_);
 }
 

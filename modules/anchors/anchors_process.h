@@ -66,7 +66,7 @@ class AnchorsProcess : public Process {
   StateChunks states_;
   ReorderBuffer<AnchorEdit> edits_;  // a single stream
   AnchorUpdates for_watchers_;
-  std::map<MapId, AnchorUpdates> for_agents_;  // key: newest map of an agent
+  std::map<MapId, AnchorUpdates> for_agents_;  // key: current map of an agent
   OtherAgents other_agents_;
   bool have_received_ = false;
   int64_t have_utime_ = 0;  // of the first tick after the first HAVE

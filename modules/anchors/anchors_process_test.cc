@@ -118,6 +118,25 @@ TEST_F(AnchorsProcessTest, AnAnchorReachesTheOtherAgentAndWatchers) {
   EXPECT_EQ(for_watchers_[0].map.agent_id, 1);
 }
 
+// Its clock was set back: the id of its newest map is not the highest.
+TEST_F(AnchorsProcessTest, AnAgentHearsOfAnchorsInTheMapThatItsPosesAreIn) {
+  SyntheticAgent restarted = world_.agents[1];
+  --restarted.map.opened_utime;
+  for (Keyframe& keyframe : restarted.keyframes) {
+    keyframe.id.map = restarted.map;
+    PublishMessage(bus_, channels::Keyframe(2), ToMessage(keyframe));
+  }
+  SendMap();
+  Send(Edit(0, restarted));
+  Tick(3);
+  EXPECT_TRUE(for_agent_2_.empty());
+  world_.agents[1] = restarted;
+  SendPoses();
+  Tick(3);
+  ASSERT_FALSE(for_agent_2_.empty());
+  EXPECT_EQ(for_agent_2_.back().map.opened_utime, restarted.map.opened_utime);
+}
+
 TEST_F(AnchorsProcessTest, AnAgentHearsOfTheOthersFiveTimesASecond) {
   SendMap();
   for (int i = 0; i < 20; ++i) {
