@@ -242,6 +242,9 @@ void AnchorApi::Change(const web::WebRequest& request, const ListedAnchor& ancho
   edit.payload = anchor.state.payload;
   edit.deleted = request.method == "DELETE";
   std::optional<int64_t> known;
+  if (edit.deleted && !request.body.empty()) {
+    return reply(Error(BadField{"", "DELETE takes no body: give the revision as If-Match"}));
+  }
   if (!edit.deleted) {
     const auto parsed = ParseEditBody(request.body, BodyOf::kChange);
     if (const auto* const bad = std::get_if<BadField>(&parsed)) {
@@ -257,10 +260,14 @@ void AnchorApi::Change(const web::WebRequest& request, const ListedAnchor& ancho
     }
   }
   if (!request.if_match.empty() && request.if_match != "*") {
-    known = RevisionOf(request.if_match);
-    if (!known) {
+    const auto matched = RevisionOf(request.if_match);
+    if (!matched) {
       return reply(Error(BadField{"If-Match", "give the revision, as \"3\""}));
     }
+    if (known && known != matched) {
+      return reply(Error(BadField{"revision", "is not that of If-Match: give one of them"}));
+    }
+    known = matched;
   }
   if (known && *known != anchor.state.revision) {
     return reply(Error(409, fmt::format("you know revision {}, the newest is {}: look again",

@@ -63,6 +63,9 @@ TEST_F(AnchorApiTest, AnEditOfWhatIsOldIsAConflict) {
   EXPECT_EQ(Ask("PUT", target, R"({"name": "x"})", "\"1\"")->status, 409);
   EXPECT_EQ(Ask("DELETE", target, "", "\"1\"")->status, 409);
   EXPECT_EQ(Ask("DELETE", target, "", "yesterday")->status, 400);
+  EXPECT_EQ(Ask("PUT", target, R"({"name": "x", "revision": 1})", "\"2\"")->status, 400);
+  EXPECT_EQ(Ask("PUT", target, R"({"name": "x", "revision": 2})", "\"1\"")->status, 400);
+  EXPECT_EQ(Ask("DELETE", target, R"({"revision": 1})")->status, 400) << "it is in If-Match";
   EXPECT_EQ(requested_.size(), before);
   const auto good = Ask("PUT", target, R"({"name": "x"})", "\"2\"");
   EXPECT_EQ(Ask("PUT", target, R"({"name": "y"})", "\"2\"")->status, 409) << "one is under way";
