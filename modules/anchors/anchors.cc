@@ -280,6 +280,11 @@ std::pair<MapId, int64_t> Anchors::GroupAndRevision(const MapId& map) const {
   return group == nullptr ? std::pair(map, int64_t{0}) : std::pair(group->id, group->revision);
 }
 
+bool Anchors::HasGroup(const MapId& group) const {
+  return std::ranges::any_of(
+      tracks_, [&](const auto& item) { return GroupAndRevision(item.first).first == group; });
+}
+
 std::optional<Anchors::NearKeyframe> Anchors::NearestKeyframe(const MapId& group,
                                                               const Eigen::Vector3d& p_map) const {
   std::optional<NearKeyframe> nearest;

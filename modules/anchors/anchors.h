@@ -77,6 +77,8 @@ class Anchors {
   std::optional<AnchorState> InItsGroup(const AnchorId& id) const;
   // The group of a map, and its revision; the map itself and 0 if no state has the map.
   std::pair<MapId, int64_t> GroupAndRevision(const MapId& map) const;
+  // Whether it is the id of a group, or of a map that is alone.
+  bool HasGroup(const MapId& group) const;
   // Pose of the odom frame in the group's frame, at the newest keyframe; identity for a map without
   // a group.
   Rigid3 T_map_odom(const MapId& map) const;

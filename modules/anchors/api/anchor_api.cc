@@ -25,6 +25,14 @@ constexpr int kMaxCorrections = 3;
 // A keyframe that is on its way is not so much newer: the time has another unit or clock.
 constexpr int64_t kMaxAhead_us = 86'400'000'000;
 
+std::string NoGroup(const MapId& group) {
+  return fmt::format(
+      "{} is no group of maps: /v1/agents has those there are; a fusion gives a group the id of "
+      "its "
+      "oldest map",
+      ToString(group));
+}
+
 }  // namespace
 
 void AnchorApi::Tick(int64_t now_utime, bool complete) {
@@ -167,6 +175,9 @@ WebAnswer AnchorApi::List(const std::string& query) const {
     if (!group) {
       return Error(BadField{"group", "give ?group=AGENT/OPENED_UTIME, a group's id"});
     }
+    if (!anchors_.HasGroup(*group)) {
+      return Error(404, NoGroup(*group));
+    }
   }
   json anchors = json::array();
   for (const ListedAnchor& anchor : ListAnchors(anchors_)) {
@@ -296,10 +307,7 @@ BadField AnchorApi::SetPose(const BodyPose& pose, AnchorEdit* edit) const {
 BadField AnchorApi::SetPose(const PoseInGroup& pose, AnchorEdit* edit) const {
   const auto nearest = anchors_.NearestKeyframe(pose.group, pose.T_map_anchor.t);
   if (!nearest) {
-    return {"pose.group",
-            fmt::format("{} is no group of maps: /v1/agents has those there are; a fusion gives a "
-                        "group the id of its oldest map",
-                        ToString(pose.group))};
+    return {"pose.group", NoGroup(pose.group)};
   }
   edit->placement = AnchorEdit::Placement::kKeyframe;
   edit->map = nearest->id.map;

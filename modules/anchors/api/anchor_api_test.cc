@@ -62,7 +62,9 @@ TEST_F(AnchorApiTest, APoseOfAFusedGroupIsKeptByTheNearestKeyframe) {
   EXPECT_LT((PositionOf(anchors[0]) - p).norm(), 0.02);
   EXPECT_EQ(anchors[0]["group_revision"], 1);
   // The other map is no longer a group.
-  EXPECT_EQ(Get("/v1/anchors?group=" + ToString(map(1))).body["anchors"].size(), 0u);
+  const Heard of_none = Get("/v1/anchors?group=" + ToString(map(1)));
+  EXPECT_EQ(of_none.status, 404);
+  EXPECT_THAT(of_none.body.value("error", ""), HasSubstr("the id of its oldest map"));
   const auto refused = Ask("POST", "/v1/anchors", NewBody(1, p));
   EXPECT_EQ(refused->status, 400);
   EXPECT_EQ(refused->body["field"], "pose.group");
