@@ -269,7 +269,7 @@ class AnchorsApi(unittest.TestCase):
     def test_1_makes_changes_and_deletes(self):
         anchor = self.make(payload='{"full": true}')
         for was, asked in zip(anchor["pose"]["position"], (1, 2, 0.5)):
-            self.assertAlmostEqual(was, asked, delta=0.05)
+            self.assertAlmostEqual(was, asked, delta=1e-4)
         self.assertEqual(anchor["group"], self.journal.group())
         target = f"/v1/anchors/{anchor['id']}"
         self.assertEqual(self.request("GET", target), (200, anchor))
@@ -309,6 +309,7 @@ class AnchorsApi(unittest.TestCase):
             self.assertEqual(self.request("POST", "/v1/anchors", body)[0], 400, body)
         self.assertEqual(self.request("POST", "/v1/anchors", "x" * 20000)[0], 413)
         self.assertEqual(self.request("GET", "/v1/anchors?group=x")[0], 400)
+        self.assertEqual(self.request("GET", "/v1/anchors?group=9/9")[0], 404)
         self.assertEqual(self.request("GET", "/v1/agents/9/anchors")[0], 404)
         self.assertEqual(self.request("GET", "/v1/nothing")[0], 404)
         self.assertEqual(self.request("PATCH", "/v1/anchors")[0], 405)
@@ -358,10 +359,11 @@ class AnchorsApi(unittest.TestCase):
     def test_6_a_journal_that_does_not_answer(self):
         self.journal.deaf, self.journal.requests = True, 0
         begin = time.monotonic()
-        status, _ = self.request("POST", "/v1/anchors", {"name": "a", "pose": {"group": self.journal.group(), "position": [0, 0, 0]}})
+        status, said = self.request("POST", "/v1/anchors", {"name": "a", "pose": {"group": self.journal.group(), "position": [0, 0, 0]}})
         took_s = time.monotonic() - begin
         self.journal.deaf = False
         self.assertEqual(status, 503)
+        self.assertEqual(self.request("GET", f"/v1/anchors/{said['id']}")[0], 404)
         self.assertTrue(4.9 < took_s < 8, took_s)
         self.assertIn(self.journal.requests, (3, 4, 5))  # one per second
 

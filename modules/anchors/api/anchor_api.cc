@@ -43,9 +43,10 @@ void AnchorApi::Tick(int64_t now_utime, bool complete) {
     if (now_utime >= it->timeout_utime) {
       const Pending late = std::move(*it);
       it = pending_.erase(it);
-      late.reply(Error(503,
-                       "the journal did not confirm this edit in 5 s: it may still get it, look "
-                       "before you send it again; does pangea-agent-handler run?"));
+      late.reply(Json(503, {{"error",
+                             "the journal did not confirm this edit in 5 s: it may still get it, "
+                             "look before you send it again; does pangea-agent-handler run?"},
+                            {"id", ToString(late.edit.anchor)}}));
       continue;
     }
     if (now_utime >= it->next_utime) {

@@ -25,6 +25,7 @@ TEST_F(AnchorApiTest, ItIsRequestedEachSecondAndGivenUpAfterFive) {
   Pass(kSecond_us / 10);
   EXPECT_EQ(heard->status, 503);
   EXPECT_THAT(heard->body.value("error", ""), HasSubstr("pangea-agent-handler"));
+  EXPECT_EQ(heard->body["id"], ToString(requested_.back().anchor));
   Pass(kSecond_us);
   EXPECT_EQ(requested_.size(), 5u);
   JournalNewest();  // later nevertheless
