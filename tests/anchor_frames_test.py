@@ -98,6 +98,13 @@ class Groups(unittest.TestCase):
             showGroup("1/5"); tell("c", "1/5"); say();
             tell("a", "", "gone"); showGroup("1/5"); say();"""), ["", "b", "b c", "a c", "c"])
 
+    def test_three_forgets_what_was_deleted_before_it_connected_again(self):
+        self.assertEqual(self.drawn("""
+            showGroup("1/5"); socket.onopen(); tell("a", "1/5"); tell("b", "1/5"); say();
+            globalThis.setTimeout = (again) => again();
+            const first = socket; first.onclose(); console.log(first === socket); say();
+            socket.onopen(); tell("b", "1/5"); showGroup("1/5"); say();"""), ["a b", "false", "a b", "b"])
+
 
 if __name__ == "__main__":
     unittest.main()

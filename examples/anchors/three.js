@@ -24,12 +24,21 @@ function listen(url, map, makeObject) {
     }
     place(shown.get(anchor.id), anchor.pose);
   }
-  const socket = new WebSocket(url);  // 'ws://127.0.0.1:8090/v1/events', with --allow-origin for this page
-  socket.onmessage = ({data}) => {
-    const anchor = JSON.parse(data);  // of type 'gone': without a pose
-    known.set(anchor.id, anchor);
-    draw(anchor);
-  };
+  function connect() {
+    const socket = new WebSocket(url);  // 'ws://127.0.0.1:8090/v1/events', with --allow-origin for this page
+    socket.onopen = () => {  // all anchors come again, without those that were deleted meanwhile
+      shown.forEach((object) => object.removeFromParent());
+      shown.clear();
+      known.clear();
+    };
+    socket.onmessage = ({data}) => {
+      const anchor = JSON.parse(data);  // of type 'gone': without a pose
+      known.set(anchor.id, anchor);
+      draw(anchor);
+    };
+    socket.onclose = () => setTimeout(connect, 1000);
+  }
+  connect();
   return (group) => {
     ownGroup = group;
     known.forEach(draw);

@@ -32,8 +32,19 @@ void Draw(Anchor anchor) {
 }
 
 async Task Listen(CancellationToken stop) {
+    while (!stop.IsCancellationRequested) {
+        try { await Receive(stop); }
+        catch (WebSocketException) { }  // no server there, or no longer
+        await Task.Delay(1000, stop);
+    }
+}
+
+async Task Receive(CancellationToken stop) {
     using var socket = new ClientWebSocket();
     await socket.ConnectAsync(new System.Uri("ws://127.0.0.1:8090/v1/events"), stop);
+    foreach (var old in shown.Values) Destroy(old);  // all anchors come again, without those that were deleted meanwhile
+    shown.Clear();
+    known.Clear();
     var buffer = new byte[65536];
     while (socket.State == WebSocketState.Open) {
         int n = 0;
@@ -42,6 +53,7 @@ async Task Listen(CancellationToken stop) {
             part = await socket.ReceiveAsync(new System.ArraySegment<byte>(buffer, n, buffer.Length - n), stop);
             n += part.Count;
         } while (!part.EndOfMessage);
+        if (part.MessageType == WebSocketMessageType.Close) return;
         var anchor = JsonUtility.FromJson<Anchor>(System.Text.Encoding.UTF8.GetString(buffer, 0, n));
         known[anchor.id] = anchor;
         Draw(anchor);
