@@ -331,6 +331,31 @@ class AnchorsApi(unittest.TestCase):
         self.assertEqual(connection.getresponse().status, 403)
         connection.close()
 
+    def test_4_what_any_request_may_be_refused_with(self):
+        port = ("Host", f"127.0.0.1:{self.port}")
+        for method, target, headers, body, status in (
+                ("GET", "/v1/anchors", [("Host", "evil.example")], None, 403), ("GET", "/v1/anchors", [port, ("Origin", "http://evil.example")], None, 403),
+                ("PATCH", "/v1/anchors", [port], None, 405), ("DELETE", "/v1/anchors/0/1", [port], "x" * 20000, 413),
+                ("GET", "/" + "x" * 9000, [port], None, 414), ("GET", "/v1/anchors", [port, ("X", "x" * 9000)], None, 431)):
+            connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=20)
+            connection.putrequest(method, target, skip_host=True)
+            for name, value in headers + [("Content-Length", str(len(body or "")))]:
+                connection.putheader(name, value)
+            connection.endheaders((body or "").encode())
+            answer = connection.getresponse()
+            self.assertEqual(answer.status, status, target[:20])
+            check(json.loads(answer.read()), OPENAPI["components"]["schemas"]["Error"], target[:20])
+            self.assertIn(str(status), OPENAPI["info"]["description"])
+            connection.close()
+
+    def test_4_a_client_too_many(self):
+        clients = [Events(self.port) for _ in range(16)]
+        status, said = self.request("GET", "/v1/events", Upgrade="websocket", Connection="Upgrade", Sec_WebSocket_Version="13",
+                                    Sec_WebSocket_Key="AAAAAAAAAAAAAAAAAAAAAA==")
+        self.assertEqual((status, said), (503, {"error": "Too many are connected."}))
+        for client in clients:
+            client.close()
+
     def test_5_events_and_the_example_follow_the_map(self):
         kept = self.make(name="kept")
         events = Events(self.port)
