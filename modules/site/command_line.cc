@@ -72,7 +72,7 @@ void Create(const Arguments& arguments) {
   const Site site = CreateSite(folder, description);
   std::cout << fmt::format(
       "{}: made; a key for each agent into {}, then: pangea-server --site {}\n", folder.string(),
-      site.keys().string(), folder.string());
+      site.keys().string(), InShell(folder));
 }
 
 void RunBackup(const Arguments& arguments) {

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cerrno>
 #include <cstring>
 #include <ctime>
@@ -105,6 +106,13 @@ void GiveToOwnerOf(const fs::path& folder, int fd) {
   }
 }
 
+fs::path Absolute(const fs::path& folder) {
+  if (folder.empty()) {
+    throw std::runtime_error("the folder's name is empty: give one");
+  }
+  return WithoutSlash(fs::absolute(folder));
+}
+
 fs::path LockOf(const Site& site) { return site.folder / "lock"; }
 
 // A lock of the whole file, held by the open file description: unlike one by flock, it can be
@@ -124,9 +132,20 @@ int ReadPid(int fd) {
 
 }  // namespace
 
-std::string NameOfFolder(const fs::path& folder) {
-  return WithoutSlash(fs::absolute(folder)).filename();
+std::string InShell(const fs::path& path) {
+  std::string text = path;
+  if (!text.empty() && std::ranges::all_of(text, [](unsigned char c) {
+        return c > 0x7f || std::isalnum(c) != 0 || std::strchr("_-./+,:@%=", c) != nullptr;
+      })) {
+    return text;
+  }
+  for (size_t at = 0; (at = text.find('\'', at)) != std::string::npos; at += 4) {
+    text.replace(at, 1, "'\\''");
+  }
+  return "'" + text + "'";
 }
+
+std::string NameOfFolder(const fs::path& folder) { return Absolute(folder).filename(); }
 
 SiteDescription NewDescription(const std::string& name) {
   SiteDescription description;
@@ -147,8 +166,7 @@ std::string ForeignFile(const fs::path& folder) {
 }
 
 void RequireOutsideSites(const fs::path& path) {
-  for (fs::path at = fs::weakly_canonical(fs::absolute(WithoutSlash(path)));
-       at.has_relative_path();) {
+  for (fs::path at = fs::weakly_canonical(Absolute(path)); at.has_relative_path();) {
     at = at.parent_path();
     std::error_code ignored;
     if (fs::exists(at / "site.yaml", ignored)) {
@@ -161,10 +179,13 @@ void RequireOutsideSites(const fs::path& path) {
 
 Site ReadSite(const fs::path& folder) {
   Site site{folder, {}};
+  if (fs::exists(folder) && !fs::is_directory(folder)) {
+    throw std::runtime_error(fmt::format("{}: is no folder; a site is one", folder.string()));
+  }
   if (!fs::exists(site.file())) {
     throw std::runtime_error(
         fmt::format("{}: is no site: it has no site.yaml; pangea-site create {} makes one",
-                    folder.string(), folder.string()));
+                    folder.string(), InShell(folder)));
   }
   YamlOptions yaml;
   site.description.Visit(yaml);
@@ -198,8 +219,7 @@ Site OpenSite(const fs::path& folder) {
 }
 
 SiteInTheMaking::SiteInTheMaking(const fs::path& folder)
-    : target_(WithoutSlash(fs::absolute(folder))),
-      staging_(fmt::format("{}.new-{}", target_.string(), getpid())) {
+    : target_(Absolute(folder)), staging_(fmt::format("{}.new-{}", target_.string(), getpid())) {
   if (fs::exists(target_) && !(fs::is_directory(target_) && fs::is_empty(target_))) {
     throw std::runtime_error(
         fmt::format("{}: exists; give another name, nothing is overwritten", target_.string()));

@@ -51,6 +51,9 @@ struct Site {
   std::filesystem::path recordings() const { return folder / "recordings"; }
 };
 
+// A path as a shell command has it: in quotes if it has blanks or the like.
+std::string InShell(const std::filesystem::path& path);
+
 // The default name of a site.
 std::string NameOfFolder(const std::filesystem::path& folder);
 // A description with the present time and the default buses.

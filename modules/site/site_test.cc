@@ -68,6 +68,16 @@ TEST(Site, RefusesAFolderOfSomethingElse) {
   EXPECT_FALSE(fs::exists(folder / "keys"));
   EXPECT_THAT(WhyNot([&] { OpenSite(folder / "thesis.tex"); }), HasSubstr("is no folder"));
   EXPECT_THAT(WhyNot([&] { ReadSite(folder); }), HasSubstr("it has no site.yaml"));
+  EXPECT_THAT(WhyNot([&] { ReadSite(folder / "thesis.tex"); }), HasSubstr("is no folder"));
+  EXPECT_THAT(WhyNot([&] { NameOfFolder(""); }), HasSubstr("name is empty"));
+  EXPECT_THAT(WhyNot([&] { CreateSite("", NewDescription("x")); }), HasSubstr("name is empty"));
+  EXPECT_THAT(WhyNot([&] { SiteInTheMaking(""); }), HasSubstr("name is empty"));
+}
+
+TEST(Site, IsNamedAsAShellHasIt) {
+  EXPECT_EQ(InShell("/maps/hall_2"), "/maps/hall_2");
+  EXPECT_EQ(InShell("my hall"), "'my hall'");
+  EXPECT_EQ(InShell("Anna's"), "'Anna'\\''s'");
 }
 
 // Whoever deletes the outer site would delete it too.
