@@ -146,6 +146,17 @@ TEST(Server, RefusesOriginsThatAreNoneAndThoseOfNoApi) {
   EXPECT_THAT(outcome.output, HasSubstr("--allow-origin requires --http"));
 }
 
+TEST(Server, RefusesAnApiWithoutAddress) {
+  const fs::path folder = FreshFolder("server_no_address");
+  fs::create_directories(folder / "keys");
+  for (const char* http : {"8090", ":8090", "127.0.0.1:", "127.0.0.1:65536", "127.0.0.1:x"}) {
+    const Outcome outcome = RunCommand(ServerCommand(folder) + " --http " + http);
+    EXPECT_EQ(outcome.exit_code, 1);
+    EXPECT_THAT(outcome.output, HasSubstr(": give ADDRESS:PORT, as 127.0.0.1:8090"));
+    EXPECT_THAT(outcome.output, Not(HasSubstr("started")));
+  }
+}
+
 TEST(Server, GivesUpWhatCannotStartAndSaysWhy) {
   const fs::path folder = FreshFolder("server_keys");
   const Outcome outcome = RunCommand(ServerCommand(folder));

@@ -177,6 +177,9 @@ int RunWorker(Arguments* arguments) {
 
 int Run(Arguments* arguments) {
   web::CheckOrigins(arguments->options.origins);
+  if (const std::string& http = arguments->options.http; !http.empty()) {
+    [[maybe_unused]] const auto checked = web::AddressAndPort(http);
+  }
   if (!arguments->worker.empty()) {
     return RunWorker(arguments);
   }

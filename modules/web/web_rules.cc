@@ -79,4 +79,19 @@ void CheckOrigins(const std::vector<std::string>& origins) {
   }
 }
 
+std::pair<std::string, uint16_t> AddressAndPort(const std::string& text) {
+  const size_t colon = std::min(text.rfind(':'), text.size());
+  const char* const end = text.data() + text.size();
+  uint16_t port = 0;
+  const auto [stop, error] = std::from_chars(std::min(text.data() + colon + 1, end), end, port);
+  if (colon == 0 || error != std::errc() || stop != end) {
+    throw std::runtime_error(fmt::format("--http {}: give ADDRESS:PORT, as 127.0.0.1:8090", text));
+  }
+  std::string address = text.substr(0, colon);
+  if (address.front() == '[' && address.back() == ']') {
+    address = address.substr(1, address.size() - 2);
+  }
+  return {address, port};
+}
+
 }  // namespace pangea::web

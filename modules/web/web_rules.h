@@ -4,8 +4,10 @@
 // by every web page that the user has open. A page whose name was pointed at 127.0.0.1 (DNS
 // rebinding) is recognised by its Host header, any other foreign page by its Origin header.
 
+#include <cstdint>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace pangea::web {
@@ -26,5 +28,9 @@ bool IsOrigin(std::string_view text);
 
 // Throws std::runtime_error, with the option's name --allow-origin, if a text is not an origin.
 void CheckOrigins(const std::vector<std::string>& origins);
+
+// Parses "127.0.0.1:8090" or "[::1]:8090"; the address is without brackets. Throws
+// std::runtime_error, with the option's name --http, if the text is not an address and port.
+std::pair<std::string, uint16_t> AddressAndPort(const std::string& text);
 
 }  // namespace pangea::web
