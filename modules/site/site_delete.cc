@@ -15,7 +15,7 @@ namespace {
 
 // Appends "-2", "-3", ... if the name exists already.
 fs::path NameFor(const fs::path& folder) {
-  const std::string first = fmt::format("{}.deleted-{}", folder.string(), TimeForFileName());
+  const std::string first = folder.string() + kDeletedMark + TimeForFileName();
   std::string name = first;
   for (int i = 2; fs::exists(name); ++i) {
     name = fmt::format("{}-{}", first, i);

@@ -15,6 +15,7 @@
 #include "messages/channels.h"
 #include "messages/encoding.h"
 #include "messages/messages.h"
+#include "site/site_delete.h"
 #include "site/site_options.h"
 
 namespace pangea::site {
@@ -95,6 +96,10 @@ std::string Date(std::optional<int64_t> utime) {
   return utime ? fmt::format("{:%Y-%m-%d %H:%M:%S} UTC",
                              fmt::gmtime(static_cast<std::time_t>(*utime / 1'000'000)))
                : "-";
+}
+
+bool IsDeleted(const fs::path& folder) {
+  return folder.filename().string().find(kDeletedMark) != std::string::npos;
 }
 
 std::string UseOf(const std::optional<int>& user) {
@@ -230,8 +235,10 @@ std::string ListSites(const fs::path& folder) {
   for (const fs::path& path : sites) {
     try {
       const Site site = ReadSite(path);
-      text += fmt::format("{:<24} {:>12}  {}  {}\n", site.description.name,
-                          Megabytes(BytesIn(path)), path.string(), UseOf(UserOf(site)));
+      const auto user = UserOf(site);
+      text +=
+          fmt::format("{:<24} {:>12}  {}  {}\n", site.description.name, Megabytes(BytesIn(path)),
+                      path.string(), IsDeleted(path) && !user ? "deleted" : UseOf(user));
     } catch (const std::exception& error) {
       text += fmt::format("{:<24} {:>12}  {}  {}\n", "?", Megabytes(BytesIn(path)), path.string(),
                           error.what());

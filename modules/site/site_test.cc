@@ -47,6 +47,7 @@ TEST(Site, IsTheFolderOneIsIn) {
   EXPECT_EQ(OpenSite(hall / ".").description.name, "hall");
   EXPECT_EQ(Delete(ReadSite(hall / "."), false).filename().string().rfind("hall.deleted-", 0), 0u);
   EXPECT_FALSE(fs::exists(hall));
+  EXPECT_THAT(ListSites(folder), testing::EndsWith("  deleted\n"));
   fs::create_directories(hall);
   SiteInTheMaking made(hall / ".");
   made.Commit(NewDescription("hall"));
