@@ -271,15 +271,8 @@ void AnchorApi::Change(const web::WebRequest& request, const ListedAnchor& ancho
       return reply(Error(bad));
     }
   }
-  if (!request.if_match.empty() && request.if_match != "*") {
-    const auto matched = RevisionOf(request.if_match);
-    if (!matched) {
-      return reply(Error(BadField{"If-Match", "give the revision, as \"3\""}));
-    }
-    if (known && known != matched) {
-      return reply(Error(BadField{"revision", "is not that of If-Match: give one of them"}));
-    }
-    known = matched;
+  if (const BadField bad = TakeIfMatch(request.if_match, &known); !bad.error.empty()) {
+    return reply(Error(bad));
   }
   if (known && *known != anchor.state.revision) {
     return reply(Error(409, fmt::format("you know revision {}, the newest is {}: look again",

@@ -69,11 +69,22 @@ std::vector<std::string> SplitPath(const std::string& path) {
   return parts;
 }
 
-std::optional<int64_t> RevisionOf(std::string_view if_match) {
+BadField TakeIfMatch(std::string_view if_match, std::optional<int64_t>* known) {
+  if (if_match.empty() || if_match == "*") {
+    return {};
+  }
   if (if_match.size() > 2 && if_match.front() == '"' && if_match.back() == '"') {
     if_match = if_match.substr(1, if_match.size() - 2);
   }
-  return ParseNumber(if_match, 1LL << 60);
+  const auto matched = ParseNumber(if_match, 1LL << 60);
+  if (!matched) {
+    return {"If-Match", "give the revision, as \"3\""};
+  }
+  if (*known && *known != matched) {
+    return {"revision", "is not that of If-Match: give one of them"};
+  }
+  *known = matched;
+  return {};
 }
 
 }  // namespace pangea::anchor_answers

@@ -27,7 +27,8 @@ web::WebAnswer OneAnchor(int status, const ListedAnchor& anchor);
 std::string PercentDecoded(std::string_view text);
 // "/v1/anchors/2/17" is {"v1", "anchors", "2", "17"}.
 std::vector<std::string> SplitPath(const std::string& path);
-// Parses If-Match: "3" with quotes, or 3.
-std::optional<int64_t> RevisionOf(std::string_view if_match);
+// Takes the revision of If-Match, "3" with quotes or 3, unless it is empty or *. `known`: that of
+// the body, which must not differ. The error is empty if all is well.
+BadField TakeIfMatch(std::string_view if_match, std::optional<int64_t>* known);
 
 }  // namespace pangea::anchor_answers

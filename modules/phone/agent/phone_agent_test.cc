@@ -14,35 +14,13 @@
 #include "messages/encoding.h"
 #include "messages/testing/test_anchors.h"
 #include "messages/testing/test_keyframes.h"
+#include "phone/agent/test_agent_texts.h"
 
 namespace pangea::phone {
 namespace {
 
-constexpr int64_t kStart_us = 1'700'000'000'000'000;
-constexpr char kKeyHex[] = "000102030405060708090a0b0c0d0e0f101112131415161718191a1b1c1d1e1f";
 const MapId kOldMap{7, kStart_us - 60'000'000};
 const MapId kLaterMap{7, kStart_us + 60'000'000};  // of an earlier run, when the clock was wrong
-
-AgentTexts Texts() {
-  AgentTexts texts;
-  texts.agent = 7;
-  texts.opened_utime = kStart_us;
-  texts.key_hex = kKeyHex;
-  texts.camera_yaml =
-      "T_BS: {rows: 4, cols: 4, data: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}\n"
-      "resolution: [64, 48]\nintrinsics: [50, 50, 31.5, 23.5]\n"
-      "distortion_model: radtan\ndistortion_coefficients: [0, 0, 0, 0]\n";
-  return texts;
-}
-
-std::string RefusedFor(const AgentTexts& texts) {
-  try {
-    ReadAgentConfig(texts);
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
-  return "";
-}
 
 int64_t Refused(const status_t& status, const std::string& reason) {
   for (const counter_t& counter : status.refused) {
@@ -384,38 +362,6 @@ TEST_F(PhoneAgentTest, AnImageOfAnotherSizeIsRefusedAndCountedAndThePoseSaysWhy)
 TEST_F(PhoneAgentTest, AnAnchorNeedsAPose) {
   EXPECT_THROW(agent_.PlaceAnchor({"kettle", "", 1000, Eigen::Vector2d(1, 1), {}}),
                std::runtime_error);
-}
-
-TEST(AgentConfigTest, WhatIsWrongIsNamed) {
-  EXPECT_EQ(RefusedFor(Texts()), "");
-  AgentTexts texts = Texts();
-  texts.agent = 0;
-  EXPECT_EQ(RefusedFor(texts), "agent: a whole number from 1 to 65535, not 0");
-  texts = Texts();
-  texts.opened_utime = std::nan("");
-  EXPECT_TRUE(RefusedFor(texts).starts_with("openedUtime: a whole number"));
-  texts = Texts();
-  texts.key_hex.back() = 'x';
-  EXPECT_EQ(RefusedFor(texts), "keyHex: must be 64 hexadecimal digits");
-  texts = Texts();
-  texts.camera_yaml = "resolution: [64, 48]";
-  EXPECT_TRUE(RefusedFor(texts).starts_with("cameraYaml: "));
-  texts = Texts();
-  texts.vio_options_yaml = "tracker: {max_feature: 3}";
-  EXPECT_NE(RefusedFor(texts).find("vioOptionsYaml"), std::string::npos);
-}
-
-TEST(AgentConfigTest, WithoutImuYamlTheOptionsNoiseCounts) {
-  AgentTexts texts = Texts();
-  texts.vio_options_yaml = "live_imu: {gyro_noise_density: 0.5}";
-  EXPECT_EQ(ReadAgentConfig(texts).imu_noise.gyro_noise_density, 0.5);
-  texts.imu_yaml =
-      "T_BS: {rows: 4, cols: 4, data: [1, 0, 0, 2, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}\n"
-      "gyroscope_noise_density: 0.25\ngyroscope_random_walk: 1\naccelerometer_noise_density: 1\n"
-      "accelerometer_random_walk: 1\nrate_hz: 100\n";
-  const AgentConfig config = ReadAgentConfig(texts);
-  EXPECT_EQ(config.imu_noise.gyro_noise_density, 0.25);
-  EXPECT_EQ(config.camera.T_body_cam.t.x(), -2);
 }
 
 }  // namespace
