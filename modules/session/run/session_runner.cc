@@ -80,9 +80,10 @@ class Runner {
     for (const Player& player : players_) {
       summary_.vio_wall_s[player.script.id] = player.ended_s - player.started_s;
       summary_.played_s[player.script.id] = monitor_.agent(player.script.id).recorded_s();
-      // What the uplink had not taken over when the player ended never comes.
+      // What the uplink had not taken over when the player gave up never comes. (One that is told
+      // to end does not wait for it.)
       const int64_t lost = player.child ? monitor_.Pending(player.child->name()) : 0;
-      if (lost > 0 && !interrupted_) {
+      if (lost > 0 && !stopped_ && !player.is_told_to_end) {
         summary_.failures.push_back(fmt::format(
             "agent {}: {} of its keyframes never reached its uplink", player.script.id, lost));
       }
