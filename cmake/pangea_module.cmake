@@ -128,13 +128,13 @@ endfunction()
 set(test_files ${CMAKE_BINARY_DIR}/tmp)
 file(MAKE_DIRECTORY ${test_files})
 
-# pangea_test(name SOURCES ... DEPENDS ... [LABEL unit|system|slow] [TIMEOUT s]) defines one GoogleTest
-# binary. The label is unit and the timeout 120 s if they are not given.
+# pangea_test(name SOURCES ... DEPENDS ... [LABEL unit|system|slow] [TIMEOUT s] [COST s]) defines one GoogleTest
+# binary. The label is unit and the timeout 120 s if they are not given; what costs more starts earlier.
 function(pangea_test name)
   if(EMSCRIPTEN)
     return()
   endif()
-  cmake_parse_arguments(ARG "" "LABEL;TIMEOUT" "SOURCES;DEPENDS" ${ARGN})
+  cmake_parse_arguments(ARG "" "LABEL;TIMEOUT;COST" "SOURCES;DEPENDS" ${ARGN})
   if(NOT ARG_LABEL)
     set(ARG_LABEL unit)
   endif()
@@ -155,4 +155,7 @@ function(pangea_test name)
   add_test(NAME ${name} COMMAND ${name})
   set_tests_properties(${name} PROPERTIES LABELS ${ARG_LABEL} TIMEOUT ${ARG_TIMEOUT}
     ENVIRONMENT TMPDIR=${test_files})
+  if(ARG_COST)
+    set_tests_properties(${name} PROPERTIES COST ${ARG_COST})
+  endif()
 endfunction()
