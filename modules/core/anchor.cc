@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "core/text.h"
+#include "core/text/control_characters.h"
 
 namespace pangea {
 

@@ -10,7 +10,6 @@
 #include "pangea/pose_t.hpp"
 
 namespace pangea {
-namespace {}  // namespace
 
 ExternalOdometryProcess::ExternalOdometryProcess(Bus& bus, int32_t agent_id,
                                                  const CameraModel& camera,

@@ -5,7 +5,7 @@
 #include <cctype>
 #include <nlohmann/json.hpp>
 
-#include "core/text.h"
+#include "core/text/control_characters.h"
 
 namespace pangea {
 namespace {

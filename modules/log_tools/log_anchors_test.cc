@@ -14,6 +14,7 @@
 #include "log_tools/anchors_gltf.h"
 #include "log_tools/log_anchors.h"
 #include "log_tools/log_export.h"
+#include "log_tools/log_tools_test_world.h"
 #include "messages/anchor_messages.h"
 #include "messages/encoding.h"
 
@@ -25,7 +26,6 @@ using testing::HasSubstr;
 using testing::Not;
 using testing::SizeIs;
 
-const std::string kSample = std::string(PANGEA_SOURCE_DIR) + "/logs/two_walks/session.lcm";
 const MapId kMap{1, 1'795'251'811'384'046};  // the sample's, whose odom frame is the map frame
 const std::string kPayload = R"({"model": "kettle.glb", "scale": 2})";
 constexpr AnchorId kKettle{1, 10}, kDoor{0, 20}, kOld{2, 30};
@@ -57,17 +57,8 @@ AnchorState StateOf(const AnchorId& id, const std::string& name, const Eigen::Ve
 }
 
 // The sample session, followed by messages as of its anchors process.
-class LogAnchorsTest : public testing::Test {
+class LogAnchorsTest : public LogToolsTest {
  protected:
-  void SetUp() override {
-    folder_ = std::filesystem::temp_directory_path() /
-              (std::string("pangea_log_anchors_") +
-               testing::UnitTest::GetInstance()->current_test_info()->name());
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_);
-  }
-  std::string Path(const std::string& name) const { return (folder_ / name).string(); }
-
   void WriteEdits(LogFileWriter& log) {
     AnchorEdit kettle = EditOf(kKettle, "kettle", 0);
     kettle.payload = kPayload;
@@ -112,7 +103,6 @@ class LogAnchorsTest : public testing::Test {
     log.Write(++utime_, channel, EncodeMessage(ToMessage(value)));
   }
 
-  std::filesystem::path folder_;
   int64_t utime_ = 1'795'251'811'000'000;
 };
 

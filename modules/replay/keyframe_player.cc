@@ -8,7 +8,6 @@
 #include "files/progress.h"
 
 namespace pangea {
-namespace {}  // namespace
 
 KeyframePlayer::KeyframePlayer(Bus& bus, const KeyframePlayerOptions& options,
                                std::vector<LoggedKeyframe> keyframes, int64_t now_utime)

@@ -28,8 +28,7 @@ constexpr int64_t kMaxAhead_us = 86'400'000'000;
 std::string NoGroup(const MapId& group) {
   return fmt::format(
       "{} is no group of maps: /v1/agents has those there are; a fusion gives a group the id of "
-      "its "
-      "oldest map",
+      "its oldest map",
       ToString(group));
 }
 

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/text.h"
+#include "core/text/control_characters.h"
 #include "options/nearest_word.h"
 
 namespace pangea {

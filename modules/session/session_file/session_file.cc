@@ -8,7 +8,7 @@
 #include <stdexcept>
 
 #include "core/anchor.h"
-#include "core/text.h"
+#include "core/text/control_characters.h"
 #include "options/nearest_word.h"
 #include "options/yaml_options.h"
 #include "server/server_processes.h"

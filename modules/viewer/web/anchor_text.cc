@@ -3,7 +3,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "core/text.h"
+#include "core/text/control_characters.h"
 
 namespace pangea::viewer {
 namespace {

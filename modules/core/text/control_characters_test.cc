@@ -1,4 +1,4 @@
-#include "core/text.h"
+#include "core/text/control_characters.h"
 
 #include <gtest/gtest.h>
 
