@@ -12,7 +12,7 @@ constexpr int64_t kAckSpacing_us = 4'000;
 constexpr int64_t kAckDelay_us = 20'000;
 constexpr int kAckPieces = 16;
 constexpr int64_t kCorrectionRepeat_us = 300'000;
-// Corrections are kept only for the newest maps; an agent works in one map at a time.
+// Corrections are kept only for the current map and the newest others.
 constexpr size_t kMaxCorrections = kMaxLinkMaps;
 
 // A repeat may differ, because a restarted uplink may have thinned the keyframe differently.
@@ -73,6 +73,7 @@ std::string AgentHandler::OnHello(const LinkPacket& packet) {
     return hello.refused;
   }
   software_ = hello.value->software;
+  current_ = hello.value->maps.empty() ? MapId() : hello.value->maps.back().map;
   std::string refused = receiver_.OnHello(*hello.value);
   for (const LinkMap& map : hello.value->maps) {
     slots_[map.slot] = map.map;
@@ -122,18 +123,23 @@ void AgentHandler::OnCorrection(const Correction& correction) {
     ack_urgent_ = true;
   }
   if (corrections_.size() > kMaxCorrections) {
-    corrections_.erase(corrections_.begin());
+    const auto oldest = corrections_.begin();
+    corrections_.erase(oldest->first == current_ ? std::next(oldest) : oldest);
   }
 }
 
-// The newest map comes first, because the agent is in it.
+// The current map comes first.
 const Correction* AgentHandler::Unconfirmed() const {
-  for (auto it = corrections_.rbegin(); it != corrections_.rend(); ++it) {
-    if (it->second.confirmed_revision < it->second.correction.revision) {
-      return &it->second.correction;
+  const Correction* newest = nullptr;
+  for (const auto& [map, sent] : corrections_) {
+    if (sent.confirmed_revision < sent.correction.revision) {
+      newest = &sent.correction;
+      if (map == current_) {
+        break;
+      }
     }
   }
-  return nullptr;
+  return newest;
 }
 
 std::optional<LinkAck> AgentHandler::TakeAck(int64_t now_us) {

@@ -66,6 +66,7 @@ class AgentHandler {
   int64_t highest_number_ = 0;
   std::array<std::optional<MapId>, 256> slots_;  // from the hellos of the current uplink run
   std::optional<pose_t> pose_;
+  MapId current_;  // the last map of the newest hello: the agent is in it
   std::map<MapId, SentCorrection> corrections_;
   int64_t last_ack_us_ = 0;
   int pieces_since_ack_ = 0;

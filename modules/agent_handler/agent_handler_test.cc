@@ -133,6 +133,22 @@ TEST_F(AgentHandlerTest, SendsTheNewestCorrectionUntilItIsConfirmed) {
   EXPECT_FALSE(handler.TakeAck(8 * kSecond));
 }
 
+// The agent's clock was set back: the map that it is in has a lower id than its earlier ones.
+TEST_F(AgentHandlerTest, SendsTheCurrentMapsCorrectionFirst) {
+  Correction correction;
+  correction.revision = 1;
+  for (int i = 0; i < 2 * kMaxLinkMaps; ++i) {
+    correction.map = {1, 5000 + i};
+    handler.OnCorrection(correction);
+  }
+  correction.map = kMap;
+  handler.OnCorrection(correction);
+  const auto ack = handler.TakeAck(2 * kSecond);
+  ASSERT_TRUE(ack);
+  ASSERT_EQ(ack->corrections.size(), 1u);
+  EXPECT_EQ(ack->corrections[0].map, kMap);
+}
+
 PlaceMatch MatchOf(int32_t seq, int num_candidates) {
   PlaceMatch match;
   match.query = {kMap, seq};

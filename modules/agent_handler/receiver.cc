@@ -6,17 +6,17 @@
 #include <iterator>
 
 namespace pangea {
-namespace {
-
-// The order in which the sender sends keyframes (Sender::UnderWay).
-bool GoesBefore(const KeyframeId& a, const KeyframeId& b) {
-  return a.map == b.map ? a.seq < b.seq : b.map < a.map;
-}
-
-}  // namespace
 
 Receiver::Receiver(const ReceiverOptions& options, Check check)
     : options_(options), check_(std::move(check)) {}
+
+// The order in which the sender sends keyframes (Sender::UnderWay).
+bool Receiver::GoesBefore(const KeyframeId& a, const KeyframeId& b) const {
+  if (a.map == b.map) {
+    return a.seq < b.seq;
+  }
+  return a.map == current_ || (b.map != current_ && b.map < a.map);
+}
 
 int32_t Receiver::ReceivedMap::SkipRuns(int32_t seq) const {
   const auto after = runs.upper_bound(seq);
@@ -43,6 +43,7 @@ void Receiver::Resume(const MapId& map_id, int32_t journalled_seq,
 }
 
 std::string Receiver::OnHello(const LinkHello& hello) {
+  current_ = hello.maps.empty() ? MapId() : hello.maps.back().map;
   // A map without keyframes that the hello no longer names is forgotten, which bounds their number.
   for (auto it = maps_.begin(); it != maps_.end();) {
     const auto& [id, map] = *it;

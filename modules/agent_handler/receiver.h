@@ -5,7 +5,7 @@
 // reports what it has. A state machine: no clock, no bus; not thread safe.
 //
 // A keyframe occupies the cache until it is journalled. When the cache is full, keyframes that the
-// uplink sends first (of the newest map, those with the lowest seqs) replace those that it sends
+// uplink sends first (of the current map, those with the lowest seqs) replace those that it sends
 // last; a piece for which there is still no room is dropped. Whatever was dropped is sent again.
 
 #include <cstdint>
@@ -90,6 +90,7 @@ class Receiver {
     bool whole() const { return count > 0 && present == count; }
   };
 
+  bool GoesBefore(const KeyframeId& a, const KeyframeId& b) const;
   bool MakeRoom(const KeyframeId& id, size_t bytes);
   // Of the keyframes not handed over yet, the one that the uplink sends last; end(): none.
   std::map<KeyframeId, Entry>::iterator Last();
@@ -100,6 +101,7 @@ class Receiver {
   const ReceiverOptions options_;
   Check check_;
   std::map<MapId, ReceivedMap> maps_;
+  MapId current_;  // the last map of the newest hello: the agent is in it
   std::map<KeyframeId, Entry> cache_;
   int64_t cached_bytes_ = 0;
   int64_t given_up_ = 0;

@@ -178,6 +178,19 @@ TEST(Receiver, OlderMapsMakeRoomForTheNewestInAFullCache) {
   EXPECT_LE(receiver.cached_bytes(), 100'000);
 }
 
+// The agent's clock was set back: the map that it is in, the hello's last, has a lower id.
+TEST(Receiver, OtherMapsMakeRoomForTheCurrentInAFullCache) {
+  Receiver receiver({100'000}, CheckContent);
+  receiver.OnHello({"", {{kLaterMap, 0, 0, 1}, {kMap, 0, 0}}});
+  for (int seq = 1; seq < 10; ++seq) {
+    AddAll(&receiver, {kLaterMap, seq});
+  }
+  EXPECT_EQ(AddPiece(&receiver, {kLaterMap, 12}, 0), "receive cache full");
+  for (int seq = 0; seq < 3; ++seq) {
+    EXPECT_EQ(AddPiece(&receiver, {kMap, seq}, 0), "") << seq;
+  }
+}
+
 TEST(Receiver, KeyframesNotYetOnDiskMakeNoRoomInAFullCache) {
   Receiver receiver({60'000}, CheckContent);
   receiver.OnHello({"", {{kMap, 0, 0}, {kLaterMap, 0, 0}}});

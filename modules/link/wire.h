@@ -87,8 +87,8 @@ struct LinkMap {
 std::string OurSoftware();
 
 struct LinkHello {
-  std::string software;  // of the uplink: printable, at most kMaxSoftwareName characters
-  std::vector<LinkMap> maps;
+  std::string software;       // of the uplink: printable, at most kMaxSoftwareName characters
+  std::vector<LinkMap> maps;  // the last one is the map that the agent is in
 };
 
 struct LinkPiece {

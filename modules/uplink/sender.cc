@@ -197,28 +197,33 @@ void Sender::FindLost(int64_t highest_number, int64_t now_us) {
   }
 }
 
-// The keyframes to send: in each map those from the next seq up to the first gap, the newest map
+// The keyframes to send: in each map those from the next seq up to the first gap, the current map
 // first, as far as the receiver's cache can hold them.
 std::vector<KeyframeId> Sender::UnderWay() const {
   std::vector<KeyframeId> ids;
   int64_t bytes = 0;
-  for (auto newest = next_.rbegin(); newest != next_.rend(); ++newest) {
-    const auto& [map, next] = *newest;
-    int32_t seq = next;
-    for (auto it = spool_.find({map, seq}); it != spool_.end(); ++it, ++seq) {
-      if (it->first != KeyframeId{map, seq}) {
-        break;
-      }
-      // A keyframe that is not loaded yet counts with the largest possible size.
-      bytes += it->second.bytes.empty() ? kMaxCompressedBytes
-                                        : static_cast<int64_t>(it->second.bytes.size());
-      if (!ids.empty() && (ids.size() >= kMaxPartialKeyframes || bytes > cache_bytes_)) {
-        return ids;
-      }
-      ids.push_back(it->first);
-    }
+  const auto current = next_.find(current_);
+  bool room = current == next_.end() || AddUnderWay({current_, current->second}, &ids, &bytes);
+  for (auto newest = next_.rbegin(); room && newest != next_.rend(); ++newest) {
+    room = newest->first == current_ || AddUnderWay({newest->first, newest->second}, &ids, &bytes);
   }
   return ids;
+}
+
+// Adds the keyframes of one map. False if there was not enough room.
+bool Sender::AddUnderWay(const KeyframeId& next, std::vector<KeyframeId>* ids,
+                         int64_t* bytes) const {
+  KeyframeId id = next;
+  for (auto it = spool_.find(id); it != spool_.end() && it->first == id; ++it, ++id.seq) {
+    // A keyframe that is not loaded yet counts with the largest possible size.
+    *bytes += it->second.bytes.empty() ? kMaxCompressedBytes
+                                       : static_cast<int64_t>(it->second.bytes.size());
+    if (!ids->empty() && (ids->size() >= kMaxPartialKeyframes || *bytes > cache_bytes_)) {
+      return false;
+    }
+    ids->push_back(id);
+  }
+  return true;
 }
 
 std::vector<Sender::Sent> Sender::Poll(int64_t now_us) {

@@ -8,8 +8,8 @@
 // that are under way. A packet counts as lost if one sent 24 numbers later has arrived, or after a
 // time-out, which follows the measured round trip (RFC 6298's estimator) and doubles with each try.
 //
-// Of several maps the newest is sent first, because its keyframes show new places, and its loop
-// closures help the agent now. Older maps use the bandwidth that is left.
+// Of several maps the current one is sent first, because its keyframes show new places, and its
+// loop closures help the agent now. The others, by descending id, use the bandwidth that is left.
 //
 // Bounds: bytes in flight, and memory (SenderOptions). When the memory is full, new keyframes are
 // refused, not old ones dropped: the chain of poses depends on the oldest, and the odometry can
@@ -65,6 +65,8 @@ class Sender {
   // The handler knows the map: keyframes are sent from this seq on, earlier ones are acknowledged.
   // A map without SetNext is not sent.
   void SetNext(const MapId& map, int32_t next_seq);
+  // The map that the odometry is in. Before the first call: the one with the highest id.
+  void SetCurrent(const MapId& map) { current_ = map; }
   void Release(const MapId& map, int32_t journalled_seq);  // acknowledged up to this seq
   // The map is finished. None of its keyframes may be in the spool.
   void Forget(const MapId& map) { next_.erase(map); }
@@ -115,6 +117,7 @@ class Sender {
   void FindLost(int64_t highest_number, int64_t now_us);
   int64_t Timeout_us(int tries) const;
   std::vector<KeyframeId> UnderWay() const;
+  bool AddUnderWay(const KeyframeId& next, std::vector<KeyframeId>* ids, int64_t* bytes) const;
   void SendPieces(const KeyframeId& id, Item* item, int64_t now_us, std::vector<Sent>* out);
   int PieceBytes(const Item& item, const Piece& piece) const;
 
@@ -125,6 +128,7 @@ class Sender {
   std::map<MapId, int> spooled_of_;  // number of spooled keyframes of each map that has any
   std::set<KeyframeId> started_;     // those with pieces
   std::map<MapId, int32_t> next_;
+  MapId current_;
   int64_t spooled_bytes_ = 0;
   int in_flight_bytes_ = 0;
   int cache_bytes_ = 0;  // size of the receiver's cache

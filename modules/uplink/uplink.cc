@@ -21,7 +21,7 @@ constexpr int32_t kMaxAsked = 50;
 // One probe would be enough for an odometry that opened a map while the uplink was away, but the
 // odometry may be away itself.
 constexpr int kMaxProbes = 3;
-constexpr int64_t kProbeOlderInterval_us = kSecond_us / 5;
+constexpr int64_t kProbeOthersInterval_us = kSecond_us / 5;
 // A gap that the odometry has not filled after this many requests is lost for good.
 constexpr int kMaxUnanswered = 30;
 // An agent opens a map each time its odometry restarts. Beyond this number, the oldest finished
@@ -72,7 +72,7 @@ Uplink::OutgoingMap& Uplink::FindOrAdd(const MapId& id) {
   if (added) {
     hello_due_ = true;
     for (auto old = maps_.begin(); maps_.size() > kMaxMaps && old != maps_.end();) {
-      const bool done = old != it && sender_.spooled(old->first) == 0;
+      const bool done = old != it && old->first != current_ && sender_.spooled(old->first) == 0;
       if (done) {
         sender_.Forget(old->first);
       }
@@ -100,6 +100,8 @@ Uplink::Taken Uplink::AddKeyframe(const KeyframeId& id, std::vector<uint8_t> byt
 
 void Uplink::AddPose(const MapId& map_id, int64_t group_revision, std::vector<uint8_t> bytes) {
   pose_ = std::move(bytes);
+  current_ = map_id;
+  sender_.SetCurrent(map_id);
   // A pose makes the map known even if all its keyframes were missed.
   FindOrAdd(map_id).applied_revision = group_revision;
 }
@@ -151,13 +153,18 @@ bool Uplink::Connected(int64_t now_us) const {
   return last_ack_us_ && now_us - *last_ack_us_ < kConnected_us;
 }
 
-// The newest map, and the newest of the other maps that have keyframes to send, or a correction to
+// The current map, and the newest of the other maps that have keyframes to send, or a correction to
 // confirm.
 std::vector<MapId> Uplink::Announced() const {
   std::vector<MapId> announced;
+  if (maps_.empty()) {
+    return announced;
+  }
+  announced.push_back(Current());
   for (auto it = maps_.rbegin(); it != maps_.rend() && announced.size() < kMaxLinkMaps; ++it) {
-    if (it == maps_.rbegin() || sender_.spooled(it->first) > 0 || it->second.confirms) {
-      announced.push_back(it->first);
+    const auto& [id, map] = *it;
+    if (id != announced.front() && (sender_.spooled(id) > 0 || map.confirms)) {
+      announced.push_back(id);
     }
   }
   std::reverse(announced.begin(), announced.end());
@@ -269,12 +276,12 @@ std::vector<Uplink::Ask> Uplink::Asks(int64_t now_us) {
   std::vector<Ask> asks;
   const bool full = sender_.Full();
   for (auto& [id, map] : maps_) {
-    const bool newest = id == maps_.rbegin()->first;
+    const bool current = id == Current();
     if (full || now_us - map.asked_us < kAskInterval_us) {
       continue;
     }
     auto gap = Missing(id, map);
-    if (!gap && newest && now_us - std::max(map.received_us, map.asked_us) > kProbeInterval_us) {
+    if (!gap && current && now_us - std::max(map.received_us, map.asked_us) > kProbeInterval_us) {
       // No keyframe is known to be missing. But after a restart, or if the last datagram was lost,
       // it would not be known. Usually there is no answer.
       map.asked_us = now_us;
@@ -294,30 +301,31 @@ std::vector<Uplink::Ask> Uplink::Asks(int64_t now_us) {
     gap->to_seq = std::min(gap->to_seq, gap->from_seq + kMaxAsked - 1);
     asks.push_back({*gap, true});
   }
-  if (const auto gap = full ? std::nullopt : ProbeOlder(now_us)) {
+  if (const auto gap = full ? std::nullopt : ProbeOthers(now_us)) {
     asks.push_back({*gap, false});
   }
   return asks;
 }
 
-std::optional<SeqGap> Uplink::ProbeOlder(int64_t now_us) {
-  if (maps_.empty() || now_us - probed_older_us_ < kProbeOlderInterval_us) {
+std::optional<SeqGap> Uplink::ProbeOthers(int64_t now_us) {
+  if (maps_.empty() || now_us - probed_others_us_ < kProbeOthersInterval_us) {
     return std::nullopt;
   }
   const auto probe = [&](const MapId& id, int32_t from_seq, int* probes) {
     ++*probes;
-    probed_older_us_ = now_us;
+    probed_others_us_ = now_us;
     return SeqGap{id, from_seq, from_seq + kMaxAsked - 1};
   };
-  for (auto it = std::next(maps_.rbegin()); it != maps_.rend(); ++it) {
+  for (auto it = maps_.rbegin(); it != maps_.rend(); ++it) {
     auto& [id, map] = *it;
-    const bool due = now_us - std::max(map.received_us, map.asked_us) > kProbeInterval_us;
+    const bool due =
+        id != Current() && now_us - std::max(map.received_us, map.asked_us) > kProbeInterval_us;
     if (map.probes < kMaxProbes && due && !Missing(id, map)) {
       map.asked_us = now_us;
       return probe(id, map.highest + 1, &map.probes);
     }
   }
-  if (probes_of_start_ < kMaxProbes && now_us - probed_older_us_ > kProbeInterval_us) {
+  if (probes_of_start_ < kMaxProbes && now_us - probed_others_us_ > kProbeInterval_us) {
     return probe({maps_.begin()->first.agent_id, 0}, 0, &probes_of_start_);
   }
   return std::nullopt;
@@ -327,9 +335,9 @@ std::vector<Correction> Uplink::TakeCorrections(int64_t now_us) {
   std::vector<Correction> due;
   for (auto& [id, map] : maps_) {
     const bool applied = map.correction && map.applied_revision >= map.correction->revision;
-    const bool newest = id == maps_.rbegin()->first;
+    const bool current = id == Current();
     if (map.correction && !applied &&
-        (map.sent_us == 0 || (newest && now_us - map.sent_us >= kSecond_us))) {
+        (map.sent_us == 0 || (current && now_us - map.sent_us >= kSecond_us))) {
       due.push_back(*map.correction);
       map.sent_us = now_us;
     }

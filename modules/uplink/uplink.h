@@ -82,8 +82,8 @@ class Uplink {
   std::vector<Ask> Asks(int64_t now_us);
   // The number for a packet about anchors (uplink_anchors.h). Only while connected.
   int64_t NextNumber(int64_t now_us) { return sender_.NextNumber(now_us); }
-  // The corrections to publish now: new ones, and once per second the newest map's, until the agent
-  // has applied it.
+  // The corrections to publish now: new ones, and once per second the current map's, until the
+  // agent has applied it.
   std::vector<Correction> TakeCorrections(int64_t now_us);
   // The highest acknowledged seq of each map; -1: none.
   std::map<MapId, int32_t> Acknowledged() const;
@@ -104,7 +104,7 @@ class Uplink {
     int64_t asked_us = 0;
     int32_t asked_from = -1;
     int unanswered = 0;
-    int probes = 0;           // since its last new keyframe, while there is a newer map
+    int probes = 0;           // since its last new keyframe, while it is not the current map
     int64_t received_us = 0;  // when the newest keyframe came
     std::optional<Correction> correction;
     bool confirms = false;         // the next hello must confirm the correction
@@ -113,14 +113,17 @@ class Uplink {
   };
 
   OutgoingMap& FindOrAdd(const MapId& id);
+  // The map that the odometry is in, as its poses say. Ids do not: the clock may have been set
+  // back. Before the first pose, the map with the highest id. There must be a map.
+  MapId Current() const { return current_.value_or(maps_.rbegin()->first); }
   void SetNext(const MapId& id, OutgoingMap* map, int32_t next);
   std::optional<SeqGap> Missing(const MapId& id, const OutgoingMap& map) const;
-  // A probe for keyframes after the last known one of an older map, or of maps before the first
+  // A probe for keyframes after the last known one of another map, or of maps before the first
   // known one. Each is probed a few times, with pauses.
-  std::optional<SeqGap> ProbeOlder(int64_t now_us);
+  std::optional<SeqGap> ProbeOthers(int64_t now_us);
   bool HelloIsUrgent(int64_t now_us) const;
   bool GiveUp(const MapId& id, OutgoingMap* map, const SeqGap& gap);
-  // The maps of the next hello, the newest last.
+  // The maps of the next hello, the current one last.
   std::vector<MapId> Announced() const;
   // Gives a slot to each map that has none, or that has the same as another one of these.
   void GiveSlots(const std::vector<MapId>& announced);
@@ -131,9 +134,10 @@ class Uplink {
   const UplinkOptions options_;
   Sender sender_;
   std::map<MapId, OutgoingMap> maps_;
+  std::optional<MapId> current_;  // of the newest pose
   uint8_t next_slot_ = 0;
   int probes_of_start_ = 0;
-  int64_t probed_older_us_ = 0;
+  int64_t probed_others_us_ = 0;
   int64_t newest_ack_ = 0;
   std::optional<int64_t> last_ack_us_;
   std::optional<int64_t> last_hello_us_;

@@ -253,6 +253,45 @@ TEST_F(UplinkTest, TheNewestMapGoesFirst) {
   EXPECT_THAT(SentSeqs(uplink.Poll(kSecond)), testing::ElementsAre(5, 0, 1));
 }
 
+// The clock was set back, and the odometry's new map has a lower id than its old one.
+TEST_F(UplinkTest, TheMapOfThePosesGoesFirst) {
+  Correction correction;
+  correction.revision = 1;
+  LinkAck ack = Ack(1, -1);
+  for (const MapId& map : {kLaterMap, kMap}) {
+    uplink.AddPose(map, 0, {1});
+    uplink.AddKeyframe({map, map == kMap ? 0 : 7}, std::vector<uint8_t>(500), 0);
+    ack.journalled_seq[map] = map == kMap ? -1 : 6;
+    correction.map = map;
+    ack.corrections.push_back(correction);
+  }
+  EXPECT_EQ(HelloIn(uplink.Poll(kSecond)).maps.back().map, kMap);
+  uplink.OnAck(ack, kSecond);
+  EXPECT_THAT(SentSeqs(uplink.Poll(kSecond)), testing::ElementsAre(0, 7));
+  EXPECT_EQ(uplink.TakeCorrections(kSecond).size(), 2u);
+  const auto again = uplink.TakeCorrections(3 * kSecond);
+  ASSERT_EQ(again.size(), 1u);
+  EXPECT_EQ(again[0].map, kMap);
+  std::map<MapId, int> probes;
+  for (int64_t now = 3 * kSecond; now < 60 * kSecond; now += 10'000) {
+    for (const Uplink::Ask& ask : uplink.Asks(now)) {
+      ++probes[ask.gap.map];
+    }
+  }
+  EXPECT_GT(probes[kMap], 50) << "its end may be lost at any time";
+}
+
+TEST_F(UplinkTest, TheMapOfThePosesIsNotForgotten) {
+  for (int i = 1; i < 300; ++i) {
+    uplink.AddPose({1, 1'000'000 + i}, 0, {1});
+  }
+  uplink.AddPose(kMap, 0, {1});
+  Add(0);
+  uplink.OnAck(Ack(1, 0), kSecond);
+  uplink.SetStored({{1, 2'000'000}, 0});
+  EXPECT_EQ(uplink.Acknowledged().at(kMap), 0);
+}
+
 TEST_F(UplinkTest, PosesGoUpAtTenHertz) {
   int poses = 0;
   for (int i = 1; i <= 300; ++i) {
