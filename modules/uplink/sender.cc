@@ -65,7 +65,9 @@ Bytes Sender::InMemory(const KeyframeId& id) const {
 void Sender::SetStored(const KeyframeId& id) {
   Item& item = FindOrAdd(id);
   item.stored = true;
-  if (item.pieces.empty() && spooled_bytes_ > kMaxStoredInMemory) {
+  // Stored keyframes must leave room for new ones.
+  const int64_t most = std::min(kMaxStoredInMemory, options_.max_spool_bytes / 2);
+  if (item.pieces.empty() && spooled_bytes_ > most) {
     spooled_bytes_ -= static_cast<int64_t>(item.bytes.size());
     item.bytes = std::vector<uint8_t>();  // "= {}" would keep the memory
   }

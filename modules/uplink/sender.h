@@ -14,7 +14,8 @@
 // Bounds: bytes in flight, and memory (SenderOptions). When the memory is full, new keyframes are
 // refused, not old ones dropped: the chain of poses depends on the oldest, and the odometry can
 // still resend the newest. Of keyframes that are also stored on disk (SetStored), only
-// kMaxStoredInMemory bytes stay in memory; the others are loaded when they are sent.
+// kMaxStoredInMemory bytes, or half of the bound if that is less, stay in memory; the others are
+// loaded when they are sent.
 
 #include <cstdint>
 #include <deque>

@@ -233,6 +233,17 @@ TEST(UplinkSpool, WhatIsStoredLeavesMemoryAndIsLoadedWhenItsTurnComes) {
   EXPECT_EQ(asks[0].gap.to_seq, 250);
 }
 
+TEST(UplinkSpool, SmallMemoryDoesNotBoundWhatTheDiskTakes) {
+  UplinkOptions options;
+  options.sender.max_spool_bytes = 1'000'000;
+  Uplink uplink(options, [](const KeyframeId&) { return std::vector<uint8_t>(50'000); });
+  for (int seq = 0; seq < 100; ++seq) {
+    ASSERT_EQ(uplink.AddKeyframe({kMap, seq}, std::vector<uint8_t>(50'000), 0), Uplink::Taken::kNew)
+        << seq;
+    uplink.SetStored({kMap, seq});
+  }
+}
+
 TEST(UplinkSpool, AnEarlierRunsKeyframesAreAnnouncedAndSent) {
   Uplink uplink({}, [](const KeyframeId&) { return std::vector<uint8_t>(500); });
   uplink.SetStored({kMap, 7});
