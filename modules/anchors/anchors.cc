@@ -13,6 +13,7 @@ namespace {
 
 constexpr int kHolds = 8;  // maximum number of keyframes that hold an anchor
 constexpr size_t kMaxNotPlaced = 100;
+constexpr int kMaxCorrections = 3;
 
 // Expresses the covariance of a transform in a rotated left frame.
 Matrix6d Rotated(const Eigen::Matrix3d& R, const Matrix6d& covariance) {
@@ -53,6 +54,30 @@ std::optional<Rigid3> Anchors::TryInGroup(const AnchorEdit& edit) const {
   const PlacementResult result = Try(edit);
   const auto* const placement = std::get_if<AnchorPlacement>(&result);
   return placement == nullptr ? std::nullopt : std::optional(Position(*placement).T_map_anchor);
+}
+
+// Several keyframes will hold the anchor, and the optimised map does not have them exactly where
+// their odometry has them. The closest result counts: a correction may change which ones hold it.
+void Anchors::MakeExact(AnchorEdit* edit) const {
+  const auto track = tracks_.find(edit->map);
+  if (edit->placement != AnchorEdit::Placement::kKeyframe || track == tracks_.end() ||
+      track->second.Find(edit->keyframe_seq) == nullptr) {
+    return;
+  }
+  const Rigid3 T_map_anchor = T_map_body(edit->map, edit->keyframe_seq) * edit->T_ref_anchor;
+  AnchorEdit corrected = *edit;
+  double least = std::numeric_limits<double>::infinity();
+  for (int i = 0; i <= kMaxCorrections; ++i) {
+    const auto result = TryInGroup(corrected);
+    if (!result) {
+      return;
+    }
+    if (const double off = result->Minus(T_map_anchor).norm(); off < least) {
+      least = off;
+      edit->T_ref_anchor = corrected.T_ref_anchor;
+    }
+    corrected.T_ref_anchor = corrected.T_ref_anchor * (result->Inverse() * T_map_anchor);
+  }
 }
 
 // If the new placement fails, the anchor keeps its old one.

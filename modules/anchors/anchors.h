@@ -96,8 +96,10 @@ class Anchors {
   const TrackedKeyframe* NewestKeyframe(const MapId& map) const;
   // The placement that an edit would have, with the present maps.
   PlacementResult Try(const AnchorEdit& edit) const;
-  // The anchor's pose in its group's frame with that placement; empty if there is none.
-  std::optional<Rigid3> TryInGroup(const AnchorEdit& edit) const;
+  // Corrects a pose relative to a keyframe, so that the anchor comes out where this keyframe has it
+  // with the present maps. Changes nothing if the edit has no such pose, or the keyframe is
+  // missing.
+  void MakeExact(AnchorEdit* edit) const;
 
   size_t num_anchors() const { return registry_.entries().size() - registry_.num_deleted(); }
   size_t num_placed() const;
@@ -114,6 +116,8 @@ class Anchors {
     Matrix6d covariance;
   };
 
+  // The anchor's pose in its group's frame with the placement of Try; empty if there is none.
+  std::optional<Rigid3> TryInGroup(const AnchorEdit& edit) const;
   void PlaceOrWait(const AnchorId& id);
   Rigid3 T_map_body(const MapId& map, int32_t seq) const;
   InGroup Position(const AnchorPlacement& placement) const;

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "anchors/anchors.h"
 #include "log_file/log_writer.h"
 #include "messages/anchor_messages.h"
 #include "messages/channels.h"
@@ -74,18 +75,22 @@ class LiveAnchors : public testing::Test {
   std::vector<AnchorEdit> requests_;
 };
 
+Keyframe FirstKeyframe() {
+  Keyframe keyframe;
+  keyframe.id = {TestMap(1), 0};
+  keyframe.utime = 77;
+  keyframe.camera.width = 752;
+  keyframe.camera.height = 480;
+  keyframe.camera.fx = keyframe.camera.fy = 460;
+  keyframe.camera.cx = 376;
+  keyframe.camera.cy = 240;
+  return keyframe;
+}
+
 class LiveAnchorsWithMap : public LiveAnchors {
  protected:
   LiveAnchorsWithMap() {
-    Keyframe keyframe;
-    keyframe.id = {TestMap(1), 0};
-    keyframe.utime = 77;
-    keyframe.camera.width = 752;
-    keyframe.camera.height = 480;
-    keyframe.camera.fx = keyframe.camera.fy = 460;
-    keyframe.camera.cx = 376;
-    keyframe.camera.cy = 240;
-    Say("KEYFRAME_1", ToMessage(keyframe));
+    Say("KEYFRAME_1", ToMessage(FirstKeyframe()));
     Say("ANCHOR", ToMessage(TestAnchor(3, TestMap(1))));
     EXPECT_THAT(process_.scene().keyframes(), SizeIs(1));
     EXPECT_THAT(process_.scene().anchors(), SizeIs(1));
@@ -168,6 +173,37 @@ TEST_F(LiveAnchors, PagesAreToldOfWhatIsNotThere) {
   TickAt(2);
   EXPECT_THAT(requests_, IsEmpty());
   EXPECT_THAT(process_.scene().notice().text, HasSubstr("no longer there"));
+}
+
+// Several keyframes hold it, which the optimised map has elsewhere than their odometry.
+TEST_F(LiveAnchorsWithMap, AMovedAnchorComesOutWhereItWasMoved) {
+  Anchors server{AnchorsOptions()};
+  Keyframe keyframe = FirstKeyframe();
+  server.Take(keyframe);
+  while (++keyframe.id.seq < 10) {
+    keyframe.utime += kSecond / 4;
+    keyframe.T_odom_body.t.x() += 0.3;
+    keyframe.edge = OdometryEdge{keyframe.id.seq - 1, Rigid3(), 1e-6 * Matrix6d::Identity()};
+    keyframe.edge->T_from_this.t.x() = 0.3;
+    server.Take(keyframe);
+    Say("KEYFRAME_1", ToMessage(keyframe));
+  }
+  MapState bent = TestState({TestMap(1)}, 9, 1);
+  for (KeyframePose& pose : bent.keyframes) {
+    pose.T_map_body = {YawRotation(0.01 * pose.id.seq), {0.31 * pose.id.seq, 0, 0}};
+  }
+  server.Take(bent);
+  for (const map_state_t& chunk : ToMessages(bent)) {
+    Say("MAP_STATE", chunk);
+  }
+  const Eigen::Vector3d p_body(0.1, 0.5, 3);
+  process_.Change({AnchorId{1, 3}, false, "", 4, p_body});
+  TickAt(1.1);
+  ASSERT_THAT(requests_, SizeIs(1));
+  requests_[0].right = AnchorRight::kEditAll;
+  ASSERT_EQ(server.Take(requests_[0]), "");
+  const Eigen::Vector3d p_map = bent.keyframes[4].T_map_body * p_body;
+  EXPECT_LT((server.All().at(0).T_odom_anchor.t - p_map).norm(), 1e-4);
 }
 
 // Two made within one tick are two.

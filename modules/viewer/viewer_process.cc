@@ -57,7 +57,21 @@ void ViewerProcess::OnMessage(const std::string& channel, Bytes data) {
   if (const auto* anchor = std::get_if<AnchorState>(&*outcome.event)) {
     requests_.Shown(anchor->anchor, anchor->revision);
   }
+  NoteForAnchors(&outcome);
   std::visit([this](const auto& event) { scene_.Take(event); }, *outcome.event);
+}
+
+void ViewerProcess::NoteForAnchors(SceneEvents::Outcome* outcome) {
+  if (!editable()) {
+    return;
+  }
+  if (const auto* state = std::get_if<MapState>(&*outcome->event)) {
+    anchors_.Take(*state);
+  }
+  if (outcome->keyframe && scene_.keyframes().size() < Scene::kMaxKeyframes) {
+    outcome->keyframe->points.clear();  // only needed for anchors behind pixels
+    anchors_.Take(*outcome->keyframe);
+  }
 }
 
 void ViewerProcess::OnHave(const Have& have) {
@@ -88,7 +102,10 @@ int64_t ViewerProcess::NewAnchorUtime() {
 }
 
 void ViewerProcess::Change(const AnchorChange& change) {
-  const auto edit = EditOf(scene_, change, NewAnchorUtime());
+  auto edit = EditOf(scene_, change, NewAnchorUtime());
+  if (edit) {
+    anchors_.MakeExact(&*edit);
+  }
   if (!edit) {
     scene_.Tell("nothing was changed: that anchor is no longer there");
   } else if (!requests_.Add(*edit, now_utime_)) {

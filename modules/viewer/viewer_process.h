@@ -7,10 +7,15 @@
 // Changes of anchors by people are published on ANCHOR_REQUEST_0, each edit once per second until
 // ANCHOR_EDIT shows that it is in the journal. The pages are told if another edit has overridden
 // it, and if it is not there after 20 s.
+//
+// An edit names one keyframe, but the server lets several hold the anchor, which the optimised map
+// has a little elsewhere than their odometry. So the viewer tries what the server will do, and
+// corrects the edit.
 
 #include <set>
 #include <string>
 
+#include "anchors/anchors.h"
 #include "bus/bus.h"
 #include "bus/node.h"
 #include "bus/process.h"
@@ -42,6 +47,7 @@ class ViewerProcess : public Process, public Show {
 
  private:
   void OnMessage(const std::string& channel, Bytes data);
+  void NoteForAnchors(SceneEvents::Outcome* outcome);
   void OnHave(const Have& have);
   void AskForMissing(int64_t now_utime);
   void OnAnchorEdit(const AnchorEdit& edit);
@@ -59,6 +65,7 @@ class ViewerProcess : public Process, public Show {
   MissingMessages keyframes_;
   std::set<MapId> results_requested_;  // maps whose earlier verification results were asked for
   AnchorRequests requests_;
+  Anchors anchors_{AnchorsOptions()};  // has the keyframes that can hold anchors, but no anchors
   int64_t newest_anchor_utime_ = 0;
 };
 

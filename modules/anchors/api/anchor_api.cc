@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <limits>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -21,7 +20,6 @@ using web::WebAnswer;
 
 // Further away from all keyframes, a small rotation would displace the anchor too far.
 constexpr double kMaxFromKeyframe_m = 1000;
-constexpr int kMaxCorrections = 3;
 // A keyframe that is on its way is not so much newer: the time has another unit or clock.
 constexpr int64_t kMaxAhead_us = 86'400'000'000;
 
@@ -310,26 +308,8 @@ BadField AnchorApi::SetPose(const PoseInGroup& pose, AnchorEdit* edit) const {
     return {"pose.position",
             fmt::format("is more than {} m from where any agent has been", kMaxFromKeyframe_m)};
   }
-  MoveTo(pose.T_map_anchor, edit);
+  anchors_.MakeExact(edit);
   return {};
-}
-
-// Several keyframes will hold the anchor, and the optimised map does not have them exactly where
-// their odometry has them. The closest result counts: a correction may change which ones hold it.
-void AnchorApi::MoveTo(const Rigid3& T_map_anchor, AnchorEdit* edit) const {
-  AnchorEdit corrected = *edit;
-  double least = std::numeric_limits<double>::infinity();
-  for (int i = 0; i <= kMaxCorrections; ++i) {
-    const auto result = anchors_.TryInGroup(corrected);
-    if (!result) {
-      return;
-    }
-    if (const double off = result->Minus(T_map_anchor).norm(); off < least) {
-      least = off;
-      edit->T_ref_anchor = corrected.T_ref_anchor;
-    }
-    corrected.T_ref_anchor = corrected.T_ref_anchor * (result->Inverse() * T_map_anchor);
-  }
 }
 
 BadField AnchorApi::SetPose(const PoseByKeyframe& pose, AnchorEdit* edit) const {

@@ -74,8 +74,6 @@ class AnchorApi : public web::WebSite {
   BadField SetPose(const PoseInGroup& pose, AnchorEdit* edit) const;
   BadField SetPose(const PoseByKeyframe& pose, AnchorEdit* edit) const;
   BadField SetPose(const PoseBehindPixel& pose, AnchorEdit* edit) const;
-  // Corrects the placement by a keyframe so that the anchor comes out at this pose.
-  void MoveTo(const Rigid3& T_map_anchor, AnchorEdit* edit) const;
   AnchorId NewId();
   void Submit(AnchorEdit edit, const Reply& reply);
   web::WebAnswer Outcome(const AnchorEdit& ours, const AnchorEdit& journalled,

@@ -140,9 +140,11 @@ Outcome Parsable(Bytes data) {
 
 Outcome FromKeyframe(Bytes data) {
   return Decoded<KeyframeMessage>(data, [](const KeyframeMessage& message) -> Outcome {
-    const Parsed<Keyframe> keyframe = Parse(message);
-    return keyframe.value ? Outcome{Shown(*keyframe.value), ""}
-                          : Outcome{std::nullopt, keyframe.refused};
+    Parsed<Keyframe> keyframe = Parse(message);
+    if (!keyframe.value) {
+      return {std::nullopt, keyframe.refused};
+    }
+    return {Shown(*keyframe.value), "", std::move(keyframe.value)};
   });
 }
 

@@ -24,6 +24,7 @@ class SceneEvents {
     // Nothing also for a chunk of a state or an image of which other chunks are missing.
     std::optional<SceneEvent> event;
     std::string refused;
+    std::optional<Keyframe> keyframe = {};  // all of the shown keyframe
   };
   // The channel's name decides the type. Messages that are not shown give neither an event nor a
   // reason.
