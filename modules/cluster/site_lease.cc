@@ -9,12 +9,19 @@ constexpr char kNobody[] = "-";
 
 }  // namespace
 
-SiteLease::SiteLease(SiteStreams& streams, std::string holder)
-    : streams_(streams), holder_(std::move(holder)) {}
+SiteLease::SiteLease(LeaseRecords& records, std::string holder)
+    : records_(records), holder_(std::move(holder)) {}
+
+std::optional<std::string> SiteLease::HolderAt(uint64_t sequence) {
+  const auto record = records_.FindLease();
+  return record && record->sequence == sequence
+             ? std::optional(std::string(record->data.begin(), record->data.end()))
+             : std::nullopt;
+}
 
 bool SiteLease::Write(const std::string& record, uint64_t behind, int64_t now_utime) {
-  const SiteStreams::StoreAnswer answer = streams_.StoreLease(record, behind);
-  if (answer.stored != SiteStreams::Stored::kNew) {
+  const NatsClient::StoreAnswer answer = records_.StoreLease(record, behind);
+  if (answer.stored != NatsClient::Stored::kNew) {
     return false;
   }
   sequence_ = answer.sequence;
@@ -23,15 +30,15 @@ bool SiteLease::Write(const std::string& record, uint64_t behind, int64_t now_ut
 }
 
 bool SiteLease::TryAcquire(int64_t now_utime) {
-  const auto newest = streams_.LeaseSequence();
+  const auto newest = records_.LeaseSequence();
   if (newest != seen_) {
-    const auto record = streams_.FindLease();
-    if (newest && *newest > 0 && !record) {
+    const auto holder = newest ? HolderAt(*newest) : std::nullopt;
+    if (newest && *newest > 0 && !holder) {
       return false;  // somebody has it, and NATS does not say who
     }
     seen_ = newest;
     seen_utime_ = now_utime;
-    seen_holder_ = record.value_or(kNobody);
+    seen_holder_ = holder.value_or(kNobody);
   }
   const bool free = newest && (seen_holder_ == kNobody || seen_holder_ == holder_ ||
                                now_utime - seen_utime_ >= kHeld_us);
@@ -48,19 +55,19 @@ bool SiteLease::Renew(int64_t now_utime) {
     return true;
   }
   // Either our record was written and NATS' answer was lost, or another host has the lease.
-  const auto newest = streams_.LeaseSequence();
+  const auto newest = records_.LeaseSequence();
   if (!newest || *newest == sequence_) {
     return true;
   }
-  const auto record = streams_.FindLease();
-  if (record && *record != holder_) {
-    seen_holder_ = *record;
+  const auto holder = HolderAt(*newest);
+  if (holder && *holder != holder_) {
+    seen_holder_ = *holder;
     return false;
   }
-  sequence_ = record ? *newest : sequence_;
+  sequence_ = holder ? *newest : sequence_;
   return true;
 }
 
-void SiteLease::Release() { streams_.StoreLease(kNobody, sequence_); }
+void SiteLease::Release() { records_.StoreLease(kNobody, sequence_); }
 
 }  // namespace pangea

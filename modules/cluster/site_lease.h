@@ -15,9 +15,21 @@
 #include <optional>
 #include <string>
 
-#include "cluster/site_streams.h"
+#include "cluster/nats_client.h"
 
 namespace pangea {
+
+// The lease's records in NATS (site_streams.h). Nothing if NATS does not answer.
+class LeaseRecords {
+ public:
+  virtual ~LeaseRecords() = default;
+  // The sequence of the newest record, as the stream's leader knows it; 0: there is no record.
+  virtual std::optional<uint64_t> LeaseSequence() = 0;
+  // The newest record, or an older one if a replica answers that lags.
+  virtual std::optional<NatsClient::Message> FindLease() = 0;
+  // Stores a record if the newest one has the sequence `behind`.
+  virtual NatsClient::StoreAnswer StoreLease(const std::string& record, uint64_t behind) = 0;
+};
 
 class SiteLease {
  public:
@@ -28,7 +40,7 @@ class SiteLease {
   static constexpr int64_t kFresh_us = 2'000'000;
 
   // `holder`: a unique name without blanks.
-  SiteLease(SiteStreams& streams, std::string holder);
+  SiteLease(LeaseRecords& records, std::string holder);
 
   // Call it at about 10 Hz until it returns true: then we hold the lease.
   bool TryAcquire(int64_t now_utime);
@@ -44,9 +56,11 @@ class SiteLease {
   const std::string& seen_holder() const { return seen_holder_; }
 
  private:
+  // The holder in the record with this sequence. Nothing also if a replica that lags answers.
+  std::optional<std::string> HolderAt(uint64_t sequence);
   bool Write(const std::string& record, uint64_t behind, int64_t now_utime);
 
-  SiteStreams& streams_;
+  LeaseRecords& records_;
   const std::string holder_;
   uint64_t term_ = 0;
   uint64_t sequence_ = 0;  // of our newest record, while we hold the lease

@@ -130,10 +130,8 @@ std::optional<SiteStreams::JournalEvent> SiteStreams::EventAt(uint64_t sequence)
   return event;
 }
 
-std::optional<std::string> SiteStreams::FindLease() {
-  const auto message = nats_.Find(Stream(kLease), LeaseSubject());
-  return message ? std::optional(std::string(message->data.begin(), message->data.end()))
-                 : std::nullopt;
+std::optional<SiteStreams::Message> SiteStreams::FindLease() {
+  return nats_.Find(Stream(kLease), LeaseSubject());
 }
 
 SiteStreams::StoreAnswer SiteStreams::StoreLease(const std::string& record, uint64_t behind) {

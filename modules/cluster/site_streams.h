@@ -22,12 +22,13 @@
 #include <vector>
 
 #include "cluster/nats_client.h"
+#include "cluster/site_lease.h"
 #include "core/keyframe.h"
 #include "core/server_messages.h"
 
 namespace pangea {
 
-class SiteStreams {
+class SiteStreams : public LeaseRecords {
  public:
   // If a worker is silent for this time, other workers get its matches.
   static constexpr int64_t kAckWait_us = 5'000'000;
@@ -48,6 +49,7 @@ class SiteStreams {
   };
   Entry EntryOf(const PlaceMatch& match) const;
   Entry EntryOf(const Constraint& result) const;
+  using Message = NatsClient::Message;
   using Stored = NatsClient::Stored;
   Stored Store(const Entry& entry) { return nats_.Store(entry.subject, entry.data, {}).stored; }
 
@@ -66,13 +68,11 @@ class SiteStreams {
   std::optional<uint64_t> JournalEnd() { return nats_.LastSequence(Stream("journal")); }
   std::optional<uint64_t> ResultsEnd() { return nats_.LastSequence(Stream("result")); }
 
-  // The lease: its newest record, and the sequence of that.
-  std::optional<uint64_t> LeaseSequence() { return nats_.LastSequence(Stream("lease")); }
-  std::optional<std::string> FindLease();
-  StoreAnswer StoreLease(const std::string& record, uint64_t behind);
+  std::optional<uint64_t> LeaseSequence() override { return nats_.LastSequence(Stream("lease")); }
+  std::optional<Message> FindLease() override;
+  StoreAnswer StoreLease(const std::string& record, uint64_t behind) override;
 
   // Nothing if the message is not there, or NATS does not answer.
-  using Message = NatsClient::Message;
   std::optional<Message> FindKeyframe(const KeyframeId& id);
   std::optional<Message> FindMatch(const KeyframeId& query);
   std::optional<Message> FindResult(const KeyframeId& query, int64_t constraint_id);

@@ -1,0 +1,76 @@
+// The lease, when the replica of NATS that answers lags behind the stream's leader.
+
+#include "cluster/site_lease.h"
+
+#include <gtest/gtest.h>
+
+#include <utility>
+#include <vector>
+
+namespace pangea {
+namespace {
+
+constexpr int64_t kSecond = 1'000'000;  // microseconds
+
+// The leader has all records, the replica that is asked for a record only the first ones.
+class LaggingRecords : public LeaseRecords {
+ public:
+  std::optional<uint64_t> LeaseSequence() override { return records_.size(); }
+  std::optional<NatsClient::Message> FindLease() override {
+    const size_t known = records_.size() - lag;
+    if (known == 0) {
+      return std::nullopt;
+    }
+    const std::string& record = records_[known - 1];
+    return NatsClient::Message{"", known, 0, {record.begin(), record.end()}};
+  }
+  NatsClient::StoreAnswer StoreLease(const std::string& record, uint64_t behind) override {
+    if (behind != records_.size()) {
+      return {NatsClient::Stored::kOtherwise};
+    }
+    records_.push_back(record);
+    return {NatsClient::Stored::kNew, records_.size()};
+  }
+
+  size_t lag = 0;  // records
+
+ private:
+  std::vector<std::string> records_;
+};
+
+class SiteLeaseTest : public testing::Test {
+ protected:
+  LaggingRecords records;
+  SiteLease first{records, "first"}, second{records, "second"};
+};
+
+TEST_F(SiteLeaseTest, AnOldRecordOfNobodyDoesNotMakeItFree) {
+  ASSERT_TRUE(first.TryAcquire(kSecond));
+  first.Release();
+  ASSERT_TRUE(first.TryAcquire(2 * kSecond));
+  records.lag = 1;
+  EXPECT_FALSE(second.TryAcquire(3 * kSecond));
+  records.lag = 0;
+  EXPECT_FALSE(second.TryAcquire(3 * kSecond));
+  EXPECT_EQ(second.seen_holder(), "first");
+  EXPECT_TRUE(first.Renew(3 * kSecond));
+}
+
+// Else it would renew the record of the other as its own.
+TEST_F(SiteLeaseTest, AnOldRecordOfOursDoesNotHideTheNewHolder) {
+  ASSERT_TRUE(first.TryAcquire(kSecond));
+  ASSERT_FALSE(second.TryAcquire(kSecond));
+  ASSERT_TRUE(second.TryAcquire(kSecond + SiteLease::kHeld_us));
+  const int64_t now = 2 * kSecond + SiteLease::kHeld_us;
+  records.lag = 1;
+  first.Renew(now);
+  first.Renew(now + kSecond);
+  EXPECT_FALSE(first.fresh(now + kSecond));
+  EXPECT_TRUE(second.Renew(now + kSecond));
+  records.lag = 0;
+  EXPECT_FALSE(first.Renew(now + kSecond));
+  EXPECT_EQ(first.seen_holder(), "second");
+}
+
+}  // namespace
+}  // namespace pangea
