@@ -166,6 +166,24 @@ TEST(Server, GivesUpWhatCannotStartAndSaysWhy) {
   EXPECT_THAT(outcome.output, HasSubstr("given up after 3 times"));
 }
 
+// A checkpoint that ends its process would do so at each start.
+TEST(Server, RemovesTheCheckpointOfWhatItGivesUp) {
+  const fs::path folder = FreshFolder("server_checkpoint");
+  for (const char* name : {"keys", "map.lcm.checkpoints"}) {
+    fs::create_directories(folder / name);
+  }
+  for (const char* process : {"posegraph", "fusion"}) {
+    std::ofstream(folder / "map.lcm.checkpoints" / process) << "bad";
+  }
+  std::ofstream(folder / "bad.yaml") << "no_such_option: 1\n";
+  const Outcome outcome =
+      RunCommand(ServerCommand(folder) + " --options posegraph=" + (folder / "bad.yaml").string());
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_THAT(outcome.output, HasSubstr("removed the checkpoint of posegraph"));
+  EXPECT_FALSE(fs::exists(folder / "map.lcm.checkpoints" / "posegraph"));
+  EXPECT_TRUE(fs::exists(folder / "map.lcm.checkpoints" / "fusion"));
+}
+
 TEST(Server, OfSeveralHostsSaysWhatItLacks) {
   const fs::path folder = FreshFolder("server_hosts");
   fs::create_directories(folder / "keys");

@@ -48,6 +48,19 @@ void Checkpoints::Add(const std::string& process, std::vector<std::string> argv)
   }
 }
 
+bool Checkpoints::Drop(const std::string& process) {
+  const auto of_process = [&](const Writer& writer) { return writer.process == process; };
+  if (std::erase_if(writers_, of_process) == 0) {
+    return false;
+  }
+  std::erase_if(to_run_, of_process);
+  if (running_ && running_->name() == process) {
+    running_.reset();  // ends it
+  }
+  std::error_code error;
+  return fs::remove(folder_ / process, error);
+}
+
 int64_t Checkpoints::JournalBytes() const {
   std::error_code error;
   const auto size = fs::file_size(journal_, error);

@@ -27,6 +27,10 @@ class Checkpoints {
   // Registers a process with the command line it was started with.
   void Add(const std::string& process, std::vector<std::string> argv);
 
+  // The process was given up. Its checkpoint may be why, or a later program may make a better state
+  // of the journal; so it is removed, and not written again. False if there is none.
+  bool Drop(const std::string& process);
+
   // Call about every 100 ms while the server runs; `now_s`: steady clock.
   void Tick(double now_s);
   // Call when the server's processes have ended: writes all checkpoints that are due, until done or

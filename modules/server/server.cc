@@ -85,11 +85,11 @@ bool IsServerProcess(const std::string& process) {
   return std::ranges::find(kServerProcesses, process) != std::end(kServerProcesses);
 }
 
-// Restarts ended processes; true if one was given up that the server needs. A gateway that has run
-// is not needed: what phones do to it must not end the map. One that cannot start is: somebody has
-// just asked for it, and can mend that.
-bool ReviveAll(KeptProcesses* kept) {
-  bool given_up = false;
+// Restarts ended processes; returns those that were given up and that the server needs. A gateway
+// that has run is not needed: what phones do to it must not end the map. One that cannot start is:
+// somebody has just asked for it, and can mend that.
+std::vector<std::string> ReviveAll(KeptProcesses* kept) {
+  std::vector<std::string> given_up;
   for (const KeptProcesses::Revived& revived : kept->Revive()) {
     const bool needed = revived.name != kGateway || !revived.ever_ran;
     const std::string end =
@@ -98,15 +98,17 @@ bool ReviveAll(KeptProcesses* kept) {
                     revived.given_up
                         ? fmt::format("given up after {} times; {}", revived.unexpected, end)
                         : "starting it again"));
-    given_up |= revived.given_up && needed;
+    if (revived.given_up && needed) {
+      given_up.push_back(revived.name);
+    }
   }
   return given_up;
 }
 
-// Runs until a signal comes or a process is given up, then stops all. True if one was given up.
-bool KeepAlive(KeptProcesses* kept, const std::function<void()>& meanwhile) {
-  bool given_up = false;
-  while (!StopRequested() && !given_up) {
+// Runs until a signal comes or a process is given up, then stops all. Returns those given up.
+std::vector<std::string> KeepAlive(KeptProcesses* kept, const std::function<void()>& meanwhile) {
+  std::vector<std::string> given_up;
+  while (!StopRequested() && given_up.empty()) {
     std::this_thread::sleep_for(kServerLookInterval);
     given_up = ReviveAll(kept);
     meanwhile();
@@ -207,11 +209,17 @@ int Serve(const ServerSetup& options) {
     Start(&kept, kGateway, GatewayCommand(options));
   }
   Say(fmt::format("what they say is in {}; Ctrl-C ends them", fs::absolute(options.logs).string()));
-  const bool given_up = KeepAlive(&kept, [&] { checkpoints.Tick(SteadySeconds()); });
+  const auto given_up = KeepAlive(&kept, [&] { checkpoints.Tick(SteadySeconds()); });
+  for (const std::string& process : given_up) {
+    if (checkpoints.Drop(process)) {
+      Say(fmt::format("removed the checkpoint of {}: it starts from the journal next time",
+                      process));
+    }
+  }
   Say("brings the checkpoints up to date; another Ctrl-C leaves them as they are");
   checkpoints.Finish();
   Say("ended");
-  return given_up ? 1 : 0;
+  return given_up.empty() ? 0 : 1;
 }
 
 int ServeAsWorker(const ServerSetup& options) {
@@ -223,8 +231,7 @@ int ServeAsWorker(const ServerSetup& options) {
     Start(&kept, verifier, Command(verifier, options));
   }
   Say(fmt::format("what they say is in {}; Ctrl-C ends them", fs::absolute(options.logs).string()));
-  const bool given_up = KeepAlive(&kept, [] {});
-  return given_up ? 1 : 0;
+  return KeepAlive(&kept, [] {}).empty() ? 0 : 1;
 }
 
 }  // namespace pangea
