@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <limits>
 #include <stdexcept>
 
@@ -19,23 +20,52 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// A failed export is removed: it would be in the way of the next one.
+constexpr const char* kPartial = "export.partial";
+
+bool HasOnlyPartial(const fs::path& folder) {
+  const auto entries = fs::directory_iterator(folder);
+  return std::all_of(begin(entries), end(entries), [](const fs::directory_entry& entry) {
+    return entry.path().filename() == kPartial;
+  });
+}
+
+// The files are made in a folder inside the new one, and moved up when all of them are complete. So
+// a failed export is removed, and one that was killed is known by its name, and not in the way.
 class NewFolder {
  public:
-  explicit NewFolder(const fs::path& path) : path_(path) { fs::create_directories(path); }
+  explicit NewFolder(const fs::path& path) : path_(path), is_new_(!fs::exists(path)) {
+    if (!is_new_ && !(fs::is_directory(path) && HasOnlyPartial(path))) {
+      throw std::runtime_error(fmt::format(
+          "--out {}: exists; give a new folder, nothing is overwritten", path.string()));
+    }
+    RequireOutsideSites(path);
+    fs::remove_all(partial());
+    fs::create_directories(partial());
+  }
   ~NewFolder() {
-    if (!is_complete_) {
-      std::error_code ignored;
-      fs::remove_all(path_, ignored);
+    std::error_code ignored;
+    fs::remove_all(partial(), ignored);
+    if (is_new_) {
+      fs::remove(path_, ignored);  // if it is empty
     }
   }
   NewFolder(const NewFolder&) = delete;
   NewFolder& operator=(const NewFolder&) = delete;
-  void Keep() { is_complete_ = true; }
+
+  fs::path partial() const { return path_ / kPartial; }
+  // Returns where the files are then.
+  std::vector<std::string> Keep(const std::vector<fs::path>& files) const {
+    std::vector<std::string> kept;
+    for (const fs::path& file : files) {
+      kept.push_back(path_ / file.filename());
+      fs::rename(file, kept.back());
+    }
+    return kept;
+  }
 
  private:
   const fs::path path_;
-  bool is_complete_ = false;
+  const bool is_new_;
 };
 
 }  // namespace
@@ -45,32 +75,26 @@ std::vector<std::string> ExportSite(const Site& site, const fs::path& out, LogRe
     throw std::runtime_error(
         fmt::format("{}: there is no journal yet, nothing to export", site.journal().string()));
   }
-  if (fs::exists(out) && !(fs::is_directory(out) && fs::is_empty(out))) {
-    throw std::runtime_error(
-        fmt::format("--out {}: exists; give a new folder, nothing is overwritten", out.string()));
-  }
-  RequireOutsideSites(out);
-  NewFolder folder(out);
-  const fs::path replayed = out / "replay.lcm";
+  const NewFolder folder(out);
+  const fs::path replayed = folder.partial() / "replay.lcm";
   const LoggedOptions logged = ReadLoggedOptions({site.journal()}, readings);
   {
     Progress progress("pangea-site");
     Replay({site.journal()}, logged.options, std::numeric_limits<double>::infinity(), replayed,
            progress, readings);
   }
-  std::vector<std::string> files = ExportTum(replayed, out);
-  files.push_back(out / "map.ply");
+  const std::vector<std::string> trajectories = ExportTum(replayed, folder.partial());
+  std::vector<fs::path> files(trajectories.begin(), trajectories.end());
+  files.push_back(folder.partial() / "map.ply");
   ExportPly(replayed, files.back());
   const LoggedAnchors anchors = ReadAnchors(replayed, nullptr, logged.options.anchors.max_anchors);
   if (!anchors.anchors.empty()) {
-    files.push_back(out / "anchors.json");
+    files.push_back(folder.partial() / "anchors.json");
     WriteTextFile(files.back(), ToJson(anchors));
-    files.push_back(out / "map.gltf");
+    files.push_back(folder.partial() / "map.gltf");
     ExportGltf(replayed, anchors, files.back());
   }
-  fs::remove(replayed);
-  folder.Keep();
-  return files;
+  return folder.Keep(files);
 }
 
 }  // namespace pangea::site

@@ -15,7 +15,8 @@ namespace pangea::site {
 // new folder: agent_<id>.tum (other groups: agent_<id>.<map>.tum), map.ply of the largest group; if
 // there are anchors, also anchors.json and map.gltf, with the anchors and the points of all groups.
 // Returns the files. A server may run; what it writes meanwhile is left out. Throws
-// std::runtime_error if there are no keyframes, keyframes are missing, or `out` is not empty.
+// std::runtime_error if there are no keyframes, keyframes are missing, or `out` is not empty; what
+// an export that was killed left there is removed.
 std::vector<std::string> ExportSite(const Site& site, const std::filesystem::path& out,
                                     LogReadings* readings);
 

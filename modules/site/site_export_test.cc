@@ -1,6 +1,9 @@
 #include "site/site_export.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <fstream>
@@ -52,6 +55,29 @@ TEST(SiteExport, LeavesNothingWhenItFails) {
   LogReadings readings;
   EXPECT_THROW(ExportSite(site, folder / "out", &readings), std::runtime_error);
   EXPECT_FALSE(std::filesystem::exists(folder / "out"));
+}
+
+// The kernel kills the child when a file of it grows beyond the limit: that of the replay is first.
+TEST(SiteExport, IsNotInTheWayOfTheNextOneWhenItIsKilled) {
+  const std::filesystem::path folder = FreshFolder("export_killed");
+  const Site site = MakeSite(folder / "hall", WalksOf({1}));
+  const pid_t child = fork();
+  if (child == 0) {
+    const rlimit limit{100'000, 100'000};
+    setrlimit(RLIMIT_FSIZE, &limit);
+    LogReadings readings;
+    ExportSite(site, folder / "out", &readings);
+    _exit(0);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  ASSERT_TRUE(WIFSIGNALED(status));
+  LogReadings readings;
+  EXPECT_EQ(ExportSite(site, folder / "out", &readings).size(), 2u);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder / "out"),
+                          std::filesystem::directory_iterator()),
+            2);
+  EXPECT_NE(WhyNot([&] { ExportSite(site, folder / "out", &readings); }), "");
 }
 
 }  // namespace
