@@ -140,6 +140,16 @@ TEST_F(SiteProgram, ExportsTrajectoriesAndPoints) {
   EXPECT_EQ(std::distance(fs::directory_iterator(folder / "out"), fs::directory_iterator()), 3);
 }
 
+// Earlier versions let a site be made inside another one.
+TEST_F(SiteProgram, ABackupSaysWhichSiteIsNotInIt) {
+  MakeSiteOfWalks();
+  Site("create " + (folder / "annex").string());
+  fs::rename(folder / "annex", folder / "hall" / "annex");
+  const Outcome outcome = Site("backup " + site + " " + (folder / "copy").string());
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_THAT(outcome.output, HasSubstr(site + "/annex: is a site of its own, and not in this"));
+}
+
 TEST_F(SiteProgram, DeletesWhatIsNamed) {
   Site("create " + site + " --name 'The hall'");
   Outcome outcome = RunCommand("echo hall | pangea-site delete " + site);

@@ -75,14 +75,23 @@ void Create(const Arguments& arguments) {
       site.keys().string(), InShell(folder));
 }
 
+void NoteSitesInside(const Site& site) {
+  for (const fs::path& inside : SitesInside(site)) {
+    std::cerr << fmt::format(
+        "pangea-site: {}: is a site of its own, and not in this backup: back it up too\n",
+        inside.string());
+  }
+}
+
 void RunBackup(const Arguments& arguments) {
-  const BackupSummary summary =
-      BackUp(ReadSite(arguments.site), arguments.out, arguments.with_keys);
+  const Site site = ReadSite(arguments.site);
+  const BackupSummary summary = BackUp(site, arguments.out, arguments.with_keys);
   std::cout << fmt::format(
       "{}: {:.1f} MB of journal, {} events, in {:.1f} MB; read again: the "
       "same{}\n",
       arguments.out, Megabytes(summary.journal_bytes), summary.events, Megabytes(summary.bytes),
       arguments.with_keys ? "; it holds the agents' keys: keep it safe" : "");
+  NoteSitesInside(site);
   NoteLoss(arguments.site, summary.lost_bytes, arguments);
 }
 

@@ -165,6 +165,19 @@ std::string ForeignFile(const fs::path& folder) {
   return "";
 }
 
+std::vector<fs::path> SitesInside(const Site& site) {
+  std::vector<fs::path> inside;
+  std::error_code error;  // a running server may remove a folder meanwhile
+  fs::recursive_directory_iterator at(site.folder, fs::directory_options::skip_permission_denied,
+                                      error);
+  for (; at != fs::recursive_directory_iterator(); at.increment(error)) {
+    if (at->path().filename() == "site.yaml" && at->path() != site.file()) {
+      inside.push_back(at->path().parent_path());
+    }
+  }
+  return inside;
+}
+
 void RequireOutsideSites(const fs::path& path) {
   for (fs::path at = fs::weakly_canonical(Absolute(path)); at.has_relative_path();) {
     at = at.parent_path();

@@ -16,6 +16,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace pangea::site {
 
@@ -61,6 +62,9 @@ SiteDescription NewDescription(const std::string& name);
 
 // The name of a file in the folder that is nothing of a site's; empty if there is none.
 std::string ForeignFile(const std::filesystem::path& folder);
+// The sites in folders of this one, which no command takes along: earlier versions let them be made
+// there.
+std::vector<std::filesystem::path> SitesInside(const Site& site);
 // Throws std::runtime_error if a new file or folder would be inside a site.
 void RequireOutsideSites(const std::filesystem::path& path);
 

@@ -98,6 +98,7 @@ TEST(Site, RefusesWhatIsInsideASite) {
               HasSubstr(inside));
   EXPECT_THAT(WhyNot([&] { ExportSite(hall, hall.folder / "out", nullptr); }), HasSubstr(inside));
   EXPECT_EQ(ForeignFile(hall.folder), "");
+  EXPECT_TRUE(SitesInside(hall).empty());
   EXPECT_NO_THROW(CreateSite(folder / "annex", NewDescription("annex")));
 }
 
