@@ -24,7 +24,9 @@ int RunCommandLine(int argc, char** argv) {
       ->required()
       ->check(CLI::ExistingFile);
   app.add_option("--bus", bus_url, "LCM URL of the agent's bus")->capture_default_str();
-  app.add_option("--rate", rate, "1 = as recorded, 2 = twice as fast, max = as the server keeps up")
+  app.add_option("--rate", rate,
+                 "1 = as recorded, but no pause above 10 s; 2 = twice as fast, max = as the server "
+                 "keeps up")
       ->check(pangea::Within(1e-3, 1e6) | CLI::IsMember({"max"}))
       ->capture_default_str();
   app.add_option("--duration", options.duration_s, "seconds to play (default: to the end)")

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "bus/process.h"
@@ -23,12 +24,19 @@ struct KeyframePlayerOptions {
 
 class KeyframePlayer : public Process {
  public:
+  // An odometry makes a keyframe every 5 s at least, so this is one that paused or began anew: a
+  // site's journal has days between its maps.
+  static constexpr int64_t kLongestPause_us = 10'000'000;
+
   // `keyframes`: only those of this agent.
   KeyframePlayer(Bus& bus, const KeyframePlayerOptions& options,
                  std::vector<LoggedKeyframe> keyframes, int64_t now_utime);
 
-  // Time of the next keyframe since the first one, sensor clock, microseconds; empty at the end.
+  // Time of the next keyframe since the first one, sensor clock without what pauses are too long,
+  // microseconds; empty at the end.
   std::optional<int64_t> next_us() const;
+  // For people: how long it will take at rate 1.
+  std::string Plan() const;
   void PlayNext();
   void Tick(int64_t now_utime) override;
   // Publishes the last status, with the counter finished = 1.
@@ -39,6 +47,7 @@ class KeyframePlayer : public Process {
  private:
   KeyframePlayerOptions options_;
   std::vector<LoggedKeyframe> keyframes_;
+  std::vector<int64_t> times_us_;
   Node node_;
   ReliableKeyframePublisher publisher_;
   size_t next_ = 0;

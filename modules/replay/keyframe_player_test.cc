@@ -57,6 +57,22 @@ TEST_F(KeyframePlayerTest, PlaysInTheKeyframesOwnTime) {
   EXPECT_EQ(player.publisher().Unacknowledged(), 3);
 }
 
+// A site's journal: the second map is of another day, and the third of another sensor clock.
+TEST_F(KeyframePlayerTest, DoesNotWaitForDays) {
+  std::vector<LoggedKeyframe> keyframes = Keyframes(4);
+  keyframes[1].utime += 3'000'000;
+  keyframes[2].utime += int64_t{86'400'000'000};
+  keyframes[3].utime = 5;
+  KeyframePlayer player(bus_, {4, 1, std::nullopt}, keyframes, 0);
+  std::vector<int64_t> times_us;
+  for (auto next = player.next_us(); next; next = player.next_us()) {
+    times_us.push_back(*next);
+    player.PlayNext();
+  }
+  EXPECT_THAT(times_us, testing::ElementsAre(0, 3'500'000, 13'500'000, 13'500'000));
+  EXPECT_THAT(player.Plan(), testing::HasSubstr("4 keyframes, 14 s; 1 longer pauses take 10 s"));
+}
+
 TEST_F(KeyframePlayerTest, StopsAfterTheDuration) {
   KeyframePlayer player(bus_, {4, 1, 1.2}, Keyframes(10), 0);
   PlayAll(&player);
