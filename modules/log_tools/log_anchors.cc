@@ -13,6 +13,7 @@
 #include "messages/anchor_messages.h"
 #include "messages/channels.h"
 #include "messages/encoding.h"
+#include "server_options/server_options.h"
 
 namespace pangea {
 namespace {
@@ -168,8 +169,9 @@ std::string Row(const AnchorId& id, const LoggedAnchor& anchor) {
 
 }  // namespace
 
-LoggedAnchors ReadAnchors(const std::string& log, LogReadings* readings, size_t max_anchors) {
-  Collector collector(max_anchors);
+LoggedAnchors ReadAnchors(const std::string& log, LogReadings* readings) {
+  const AnchorsOptions options = ReadLoggedOptions({log}, readings).options.anchors;
+  Collector collector(static_cast<size_t>(options.max_anchors));
   ReadLog(
       log, [&collector](const LogEvent& event) { collector.Take(event); }, readings);
   return collector.Finish();

@@ -3,7 +3,6 @@
 // The anchors at the end of a log: ANCHOR has their poses, ANCHOR_EDIT their edits and editors. A
 // journal (journal.lcm) has only edits; a replay of it has both.
 
-#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -33,10 +32,9 @@ struct LoggedAnchors {
 };
 
 // Damaged parts of the log are reported in `readings` (log_reader.h). Throws std::runtime_error if
-// it cannot be opened or is not a log. `max_anchors`: the server's option; an edit that makes more
-// is refused.
-LoggedAnchors ReadAnchors(const std::string& log, LogReadings* readings = nullptr,
-                          size_t max_anchors = std::numeric_limits<size_t>::max());
+// it cannot be opened or is not a log. Edits that the server refuses are in the log too: those that
+// make more anchors than its option allows (OPTIONS_anchors) are refused here as well.
+LoggedAnchors ReadAnchors(const std::string& log, LogReadings* readings = nullptr);
 
 // Standard deviation of the position, metres: root mean square over its axes.
 double RmsPositionSigma(const AnchorState& state);

@@ -17,6 +17,7 @@
 #include "log_tools/log_tools_test_world.h"
 #include "messages/anchor_messages.h"
 #include "messages/encoding.h"
+#include "pangea/options_t.hpp"
 
 namespace pangea {
 namespace {
@@ -153,6 +154,23 @@ TEST_F(LogAnchorsTest, RefusedEditsAreCounted) {
   EXPECT_EQ(logged.num_refused, 2);
   EXPECT_TRUE(logged.anchors.empty());
   EXPECT_THAT(ToText(logged, path), HasSubstr("2 messages refused"));
+}
+
+// The server keeps such an edit in its journal, but its anchor does not exist.
+TEST_F(LogAnchorsTest, AnEditBeyondTheServersLimitMakesNoAnchor) {
+  const std::string path = Path("limit.lcm");
+  {
+    LogFileWriter log(path);
+    options_t options{};
+    options.process = "anchors";
+    options.yaml = "max_anchors: 1\n";
+    log.Write(++utime_, "OPTIONS_anchors", EncodeMessage(options));
+    Write(log, "ANCHOR_EDIT", EditOf(kKettle, "kettle", 0));
+    Write(log, "ANCHOR_EDIT", EditOf(kDoor, "door", 1));
+  }
+  const LoggedAnchors logged = ReadAnchors(path);
+  EXPECT_EQ(logged.num_refused, 1);
+  EXPECT_TRUE(logged.anchors.size() == 1 && logged.anchors.contains(kKettle));
 }
 
 TEST_F(LogAnchorsTest, JsonHasEveryField) {

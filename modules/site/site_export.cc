@@ -87,7 +87,7 @@ std::vector<std::string> ExportSite(const Site& site, const fs::path& out, LogRe
   std::vector<fs::path> files(trajectories.begin(), trajectories.end());
   files.push_back(folder.partial() / "map.ply");
   ExportPly(replayed, files.back());
-  const LoggedAnchors anchors = ReadAnchors(replayed, nullptr, logged.options.anchors.max_anchors);
+  const LoggedAnchors anchors = ReadAnchors(replayed);
   if (!anchors.anchors.empty()) {
     files.push_back(folder.partial() / "anchors.json");
     WriteTextFile(files.back(), ToJson(anchors));
