@@ -7,6 +7,7 @@
 
 #include "bus/node.h"
 #include "bus/process.h"
+#include "messages/catch_up_messages.h"
 #include "messages/channels.h"
 #include "messages/encoding.h"
 #include "messages/messages.h"
@@ -70,6 +71,8 @@ void SessionMonitor::WatchAgent(int32_t id, Bus& bus) {
                 [this, id](const std::string&, Bytes data) { OnKeyframe(id, data); });
   bus.Subscribe(channels::Correction(id),
                 [this, id](const std::string&, Bytes data) { OnCorrection(id, data); });
+  bus.Subscribe(std::string(channels::kHave),
+                [this](const std::string&, Bytes data) { OnHave(data); });
   bus.Subscribe(std::string(channels::kAllStatus),
                 [this](const std::string&, Bytes data) { OnStatus(data); });
 }
@@ -135,16 +138,31 @@ void SessionMonitor::OnPose(int32_t agent_id, Bytes data) {
   }
 }
 
-// Stored keyframes are played without poses between them.
 void SessionMonitor::OnKeyframe(int32_t agent_id, Bytes data) {
   KeyframeMessage message;
-  if (with_odometry_.contains(agent_id) || !DecodeMessage(data, &message)) {
+  const auto id = DecodeMessage(data, &message) ? Parse(message.id).value : std::nullopt;
+  if (!id || id->map.agent_id != agent_id) {
     return;
   }
+  int32_t& published = published_[id->map];
+  published = std::max(published, id->seq + 1);
+  if (with_odometry_.contains(agent_id)) {
+    return;
+  }
+  // Stored keyframes are played without poses between them.
   AgentProgress& progress = agents_[agent_id];
   NoteTime(message.utime, &progress);
   progress.tracking = true;
   NotePose(agent_id, message.id.map, message.T_odom_body);
+}
+
+void SessionMonitor::OnHave(Bytes data) {
+  if (const auto have = ParseMessage<have_t>(data).value) {
+    for (const auto& [map, highest_seq] : have->highest_seq) {
+      int32_t& acknowledged = acknowledged_[map];
+      acknowledged = std::max(acknowledged, highest_seq + 1);
+    }
+  }
 }
 
 void SessionMonitor::OnStatus(Bytes data) {
@@ -200,9 +218,20 @@ bool SessionMonitor::HaveReported(const std::vector<std::string>& processes) con
                              [&](const std::string& name) { return statuses_.contains(name); });
 }
 
-int64_t SessionMonitor::Pending(const std::string& process) const {
-  const auto status = statuses_.find(process);
-  return status == statuses_.end() ? 0 : status->second.pending;
+int64_t SessionMonitor::Unacknowledged(int32_t id) const {
+  int64_t count = 0;
+  for (const auto& [map, published] : published_) {
+    const auto acknowledged = acknowledged_.find(map);
+    if (map.agent_id == id) {
+      count +=
+          std::max(0, published - (acknowledged == acknowledged_.end() ? 0 : acknowledged->second));
+    }
+  }
+  return count;
+}
+
+void SessionMonitor::ForgetPublished(int32_t id) {
+  std::erase_if(published_, [id](const auto& item) { return item.first.agent_id == id; });
 }
 
 bool SessionMonitor::Idle(const std::vector<std::string>& processes, double quiet_s) const {

@@ -50,8 +50,10 @@ class SessionMonitor {
   Bus& agent_bus(int32_t id) { return *agent_buses_.at(id); }
   // Newest status of each process, by name, from any bus.
   const std::map<std::string, status_t>& statuses() const { return statuses_; }
-  // By its newest status; 0 if it never sent one.
-  int64_t Pending(const std::string& process) const;
+  // Number of the agent's keyframes on its bus that the server has not acknowledged.
+  int64_t Unacknowledged(int32_t id) const;
+  // The agent's player was killed and starts again: what it had published does not count.
+  void ForgetPublished(int32_t id);
   // CPU time of each process, over all its starts.
   std::map<std::string, double> CpuSeconds() const;
   int constraints_accepted() const { return accepted_; }
@@ -73,6 +75,7 @@ class SessionMonitor {
   void OnCorrection(int32_t agent_id, Bytes data);
   void OnPose(int32_t agent_id, Bytes data);
   void OnKeyframe(int32_t agent_id, Bytes data);
+  void OnHave(Bytes data);
   void NotePose(int32_t agent_id, const map_id_t& map, const rigid3_t& T_odom_body);
   void OnStatus(Bytes data);
 
@@ -86,6 +89,7 @@ class SessionMonitor {
   std::map<int32_t, NewestPose> poses_;  // by agent
   std::set<int32_t> with_odometry_;      // agents that publish poses
   std::map<MapId, Drift> drifts_;
+  std::map<MapId, int32_t> published_, acknowledged_;  // number of keyframes
   GroupStates<GroupMaps> groups_;
   std::map<std::string, status_t> statuses_;
   std::map<std::string, int64_t> status_received_;  // wall clock

@@ -7,6 +7,7 @@
 #include "messages/channels.h"
 #include "messages/encoding.h"
 #include "messages/messages.h"
+#include "pangea/have_t.hpp"
 #include "pangea/pose_t.hpp"
 
 namespace pangea::session {
@@ -72,6 +73,33 @@ TEST_F(SessionMonitorTest, CpuTimeIsThatOfAllStartsOfAProcess) {
     Publish(channels::Status(status.process), status);
   }
   EXPECT_DOUBLE_EQ(monitor_.CpuSeconds().at("fusion"), 6);
+}
+
+// Those that wait in the uplink's spool come later, so only what HAVE lacks at the end is lost.
+TEST_F(SessionMonitorTest, KeyframesAreLostThatTheServerNeverAcknowledges) {
+  for (int32_t seq = 0; seq < 5; ++seq) {
+    KeyframeMessage keyframe{};
+    keyframe.id.map = ToMessage(kFirst);
+    keyframe.id.seq = seq;
+    Publish(channels::Keyframe(2), keyframe);
+  }
+  EXPECT_EQ(monitor_.Unacknowledged(2), 5);
+  EXPECT_EQ(monitor_.Unacknowledged(1), 0);
+  const auto publish_have = [this](int32_t highest_seq) {
+    have_t have{};
+    have.num_maps = 1;
+    have.maps = {ToMessage(kFirst)};
+    have.highest_seq = {highest_seq};
+    Publish(std::string(channels::kHave), have);
+  };
+  publish_have(1);
+  EXPECT_EQ(monitor_.Unacknowledged(2), 3);
+  publish_have(4);
+  EXPECT_EQ(monitor_.Unacknowledged(2), 0);
+  publish_have(1);  // of an uplink that was started again
+  EXPECT_EQ(monitor_.Unacknowledged(2), 0);
+  monitor_.ForgetPublished(2);
+  EXPECT_EQ(monitor_.Unacknowledged(2), 0);
 }
 
 }  // namespace

@@ -80,12 +80,12 @@ class Runner {
     for (const Player& player : players_) {
       summary_.vio_wall_s[player.script.id] = player.ended_s - player.started_s;
       summary_.played_s[player.script.id] = monitor_.agent(player.script.id).recorded_s();
-      // What the uplink had not taken over when the player gave up never comes. (One that is told
-      // to end does not wait for it.)
-      const int64_t lost = player.child ? monitor_.Pending(player.child->name()) : 0;
+      // A player that gives up on its uplink leaves keyframes that never come. (One that is told to
+      // end does not wait for it.)
+      const int64_t lost = monitor_.Unacknowledged(player.script.id);
       if (lost > 0 && !stopped_ && !player.is_told_to_end) {
         summary_.failures.push_back(fmt::format(
-            "agent {}: {} of its keyframes never reached its uplink", player.script.id, lost));
+            "agent {}: {} of its keyframes never reached the server", player.script.id, lost));
       }
     }
     return summary_;
@@ -254,6 +254,7 @@ class Runner {
       ++player.restarts;
       summary_.restarted.push_back(player.child->name());
       player.played_before_s = monitor_.agent(player.script.id).recorded_s();
+      monitor_.ForgetPublished(player.script.id);
       StartPlayer(player);
     } else {
       player.ended_s = Now();
