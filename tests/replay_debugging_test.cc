@@ -69,6 +69,18 @@ TEST_F(ReplayDebugging, OneProcessAloneHasNoReport) {
   }
 }
 
+TEST_F(ReplayDebugging, WhatIsAskedIsCheckedBeforeTheReplay) {
+  Outcome outcome = Replay(kSample, "unasked", "--explain 5");
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_THAT(outcome.output, HasSubstr("--explain 5: no match of two keyframes of " + kSample));
+  outcome = Replay(kSample, "unasked", "--diff " PANGEA_SOURCE_DIR "/README.md");
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_THAT(outcome.output, HasSubstr("README.md: is no LCM log"));
+  EXPECT_FALSE(fs::exists(*folder_ / "unasked"));
+  outcome = RunCommand("pangea-log explain " + kSample + " --constraint 5 --recording 1=nowhere");
+  EXPECT_THAT(outcome.output, HasSubstr("--recording 1=nowhere: there is no such folder"));
+}
+
 TEST_F(ReplayDebugging, APartOfTheLog) {
   const Outcome part = Replay(kSample, "part", "--until 6 --diff " + Log("whole"));
   const Outcome info = RunCommand("pangea-log info " + Log("part"));

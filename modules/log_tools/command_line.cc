@@ -79,10 +79,10 @@ void ExplainResult(Arguments& arguments) {
     std::cout << ListResults(log, &arguments.readings);
     return;
   }
+  std::map<int32_t, std::string> recordings = RecordingsById(arguments.recordings);
   const Explanation explanation = Explain(log, *arguments.constraint, &arguments.readings);
   std::cout << ToText(explanation);
   if (!arguments.out.empty()) {
-    std::map<int32_t, std::string> recordings = RecordingsById(arguments.recordings);
     recordings.merge(RecordingsAtHand(ReadSessionRecord({log})));
     WriteExplanationPng(explanation, recordings, arguments.out);
   }

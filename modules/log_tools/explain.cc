@@ -1,12 +1,14 @@
 #include "log_tools/explain.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 #include <memory>
 #include <numbers>
 #include <optional>
+#include <set>
 #include <stdexcept>
 
 #include "core/median.h"
@@ -184,6 +186,35 @@ Explanation Explain(const std::string& log, int64_t constraint_id, LogReadings* 
   explanation.again =
       verifier->Verify(explanation.said.to, explanation.candidate, &explanation.report);
   return explanation;
+}
+
+void CheckConstraintId(const std::vector<std::string>& logs, int64_t constraint_id,
+                       LogReadings* readings) {
+  std::set<KeyframeId> keyframes;
+  const auto add = [&keyframes](const LogEvent& event) {
+    KeyframeMessage message{};
+    if (event.channel.starts_with(channels::kKeyframePrefix) &&
+        DecodeMessage(event.data, &message)) {
+      if (const auto id = Parse(message.id).value) {
+        keyframes.insert(*id);
+      }
+    }
+  };
+  for (const std::string& log : logs) {
+    ReadLog(log, add, readings);
+  }
+  for (const KeyframeId& from : keyframes) {
+    for (const KeyframeId& to : keyframes) {
+      if (ConstraintId(from, to, PlaceKind::kInter) == constraint_id ||
+          (from.map == to.map && ConstraintId(from, to, PlaceKind::kIntra) == constraint_id)) {
+        return;
+      }
+    }
+  }
+  throw std::runtime_error(fmt::format(
+      "--explain {}: no match of two keyframes of {} has this id; pangea-log explain LOG "
+      "lists the constraints of a log",
+      constraint_id, fmt::join(logs, ", ")));
 }
 
 std::string ToText(const Explanation& e) {

@@ -29,6 +29,11 @@ std::string ListResults(const std::string& log, LogReadings* readings = nullptr)
 // Throws std::runtime_error if the log lacks the verification result, its candidate or a keyframe.
 Explanation Explain(const std::string& log, int64_t constraint_id, LogReadings* readings = nullptr);
 
+// Throws std::runtime_error if no match of two keyframes of these logs has this id, so that no
+// replay of them will have it.
+void CheckConstraintId(const std::vector<std::string>& logs, int64_t constraint_id,
+                       LogReadings* readings = nullptr);
+
 std::string ToText(const Explanation& explanation);
 // Each row shows the match on the left and the query on the right: the candidate's corners, PnP,
 // and, if it was reached, the window BA; below is the verification result. `recordings`: folders by

@@ -14,6 +14,7 @@
 #include "bus/process.h"
 #include "files/make_folder.h"
 #include "files/progress.h"
+#include "log_file/log_reader.h"
 #include "log_tools/explain.h"
 #include "log_tools/log_diff.h"
 #include "log_tools/log_info.h"
@@ -147,6 +148,16 @@ void ExplainInto(const fs::path& out, int64_t constraint, const SessionRecord& k
   std::cout << fmt::format("{}{}\n", ToText(explanation), picture.string());
 }
 
+// What is asked after a replay, which may take hours, is checked before it.
+void CheckQuestions(const ReplayArguments& arguments, LogReadings* readings) {
+  if (arguments.explain) {
+    CheckConstraintId(arguments.logs, *arguments.explain, readings);
+  }
+  if (!arguments.diff.empty()) {
+    LogReader(arguments.diff).Next();  // throws if it is not a log
+  }
+}
+
 bool IsIn(const fs::path& file, const fs::path& folder) {
   return fs::exists(folder) && fs::equivalent(fs::absolute(file).parent_path(), folder);
 }
@@ -165,6 +176,7 @@ int RunReplay(const ReplayArguments& arguments, LogReadings* readings) {
                     "folder",
                     arguments.out));
   }
+  CheckQuestions(arguments, readings);
   if (!arguments.only.empty()) {
     return RunReplayOnly(arguments, readings);
   }
