@@ -63,12 +63,17 @@ class Triangulation {
     OdometryError error;
     for (int f = window.newest() - 1; f >= 0; --f) {
       error.Add(*window.keyframe(f + 1).edge);
-      AddNeighbour(f, *window.frames[f], error, window.landmark_of_corner[f]);
+      AddNeighbour(f, *window.frames[f], window.T_w_cam[f].Inverse() * window.T_w_cam.back(), error,
+                   window.landmark_of_corner[f]);
     }
     error = {};
+    Rigid3 T_host_body = host_.keyframe().camera.T_body_cam.Inverse();
     for (const auto& view : after) {
-      error.Add(*view->keyframe().edge);
-      AddNeighbour(kNotOfTheWindow, *view, error,
+      const Keyframe& keyframe = view->keyframe();
+      error.Add(*keyframe.edge);
+      T_host_body = T_host_body * keyframe.edge->T_from_this;
+      const Rigid3 T_host_cam = T_host_body * keyframe.camera.T_body_cam;
+      AddNeighbour(kNotOfTheWindow, *view, T_host_cam.Inverse(), error,
                    std::vector<int>(view->keyframe().corners.size(), -1));
     }
   }
@@ -129,12 +134,12 @@ class Triangulation {
     }
   };
 
-  void AddNeighbour(int frame, const KeyframeView& view, const OdometryError& error,
-                    const std::vector<int>& landmark_of_corner) {
+  void AddNeighbour(int frame, const KeyframeView& view, const Rigid3& T_cam_host,
+                    const OdometryError& error, const std::vector<int>& landmark_of_corner) {
     Neighbour neighbour;
     neighbour.frame = frame;
     neighbour.view = &view;
-    neighbour.T_cam_host = view.T_odom_cam().Inverse() * host_.T_odom_cam();
+    neighbour.T_cam_host = T_cam_host;
     neighbour.sigma_m = std::sqrt(error.var_m);
     neighbour.sigma_rad = std::sqrt(error.var_rad);
     for (int i = 0; i < static_cast<int>(landmark_of_corner.size()); ++i) {

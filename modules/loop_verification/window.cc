@@ -81,6 +81,17 @@ void AddLandmark(int32_t id, const Estimate& estimate, Window* window) {
   window->landmarks.push_back(std::move(landmark));
 }
 
+// Poses along the edges, which are better than the published poses (keyframe_t.lcm). The axes are
+// those of odom at the newest keyframe, and the origin is there.
+std::vector<Rigid3> PosesAlongEdges(const KeyframeWindow& frames) {
+  std::vector<Rigid3> T_w_body(frames.size());
+  T_w_body.back().q = frames.back()->keyframe().T_odom_body.q;
+  for (size_t i = frames.size() - 1; i > 0; --i) {
+    T_w_body[i - 1] = T_w_body[i] * frames[i]->keyframe().edge->T_from_this.Inverse();
+  }
+  return T_w_body;
+}
+
 }  // namespace
 
 KeyframeWindow LastOfWindow(const KeyframeWindow& frames) {
@@ -118,11 +129,10 @@ Window MakeWindow(KeyframeWindow frames, const WindowOptions& options,
                   const KeyframeWindow& after) {
   Window window;
   window.frames = std::move(frames);
-  const Eigen::Vector3d origin = window.frames.back()->keyframe().T_odom_body.t;
-  for (const auto& view : window.frames) {
-    const Keyframe& keyframe = view->keyframe();
-    window.T_w_body.emplace_back(keyframe.T_odom_body.q, keyframe.T_odom_body.t - origin);
-    window.T_w_cam.push_back(window.T_w_body.back() * keyframe.camera.T_body_cam);
+  window.T_w_body = PosesAlongEdges(window.frames);
+  for (size_t i = 0; i < window.frames.size(); ++i) {
+    const Keyframe& keyframe = window.frames[i]->keyframe();
+    window.T_w_cam.push_back(window.T_w_body[i] * keyframe.camera.T_body_cam);
     window.landmark_of_corner.emplace_back(keyframe.corners.size(), -1);
   }
   for (const auto& [id, estimate] : DepthsOf(window)) {

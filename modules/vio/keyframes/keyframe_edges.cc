@@ -13,21 +13,21 @@ int64_t TakenAt(const WindowState& state, const WindowFrame& frame) {
          std::llround(1e6 * frame.stamp_error_s);
 }
 
+// T_odom_body at that time, as the window has it now.
+Rigid3 PoseOf(const WindowState& state, int index) {
+  return state.PoseAhead(index, state.Ahead(index, 0));
+}
+
 }  // namespace
 
 FinishedKeyframe KeyframeEdges::Finish(WindowState& state, const Eigen::MatrixXd& P,
                                        const TrackHistory& history, const ImuBuffer& imu,
                                        int index) {
   FinishedKeyframe keyframe = FinishKeyframe(state, P, history, index);
-  const int at = state.FirstRow(index);
   const auto from = last_ ? state.Find(last_->utime) : std::nullopt;
   if (from) {
-    const int at_from = state.FirstRow(*from);
-    keyframe.edge = FinishedKeyframe::Edge{last_->T_odom_body.Inverse() * keyframe.T_odom_body,
+    keyframe.edge = FinishedKeyframe::Edge{PoseOf(state, *from).Inverse() * keyframe.T_odom_body,
                                            RelativeCovariance(state, P, *from, index)};
-    keyframe.edge->covariance +=
-        CorrectionCovariance(last_covariance_ - P.block<6, 6>(at_from, at_from), last_->T_odom_body,
-                             keyframe.T_odom_body);
     ScaledPreintegration span =
         imu.Integrate(TakenAt(state, state.frames[*from]), TakenAt(state, state.frames[index]),
                       state.imu_intrinsics, last_->gyro_bias, last_->accel_bias);
@@ -40,7 +40,6 @@ FinishedKeyframe KeyframeEdges::Finish(WindowState& state, const Eigen::MatrixXd
   contradicted_utimes_.erase(contradicted_utimes_.begin(),
                              contradicted_utimes_.upper_bound(keyframe.utime));
   last_ = keyframe;
-  last_covariance_ = P.block<6, 6>(at, at);
   return keyframe;
 }
 

@@ -2,6 +2,10 @@
 
 // Completes keyframes in the order of publication: adds the odometry edge from the previous
 // keyframe and the preintegrated IMU measurement of the same span.
+//
+// The edge is the motion as the window has it now. Since the previous keyframe was published, the
+// window may have corrected its pose; while a wrong time offset or scale converges, by tens of
+// sigmas. So chained edges are better than published poses, and differ from these.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -30,8 +34,7 @@ class KeyframeEdges {
   bool ContradictedWithin(int64_t after_utime, int64_t to_utime) const;
 
   std::optional<FinishedKeyframe> last_;
-  Matrix6d last_covariance_ = Matrix6d::Zero();  // of last_'s pose, at publication
-  std::set<int64_t> contradicted_utimes_;        // ends of contradicted IMU factors
+  std::set<int64_t> contradicted_utimes_;  // ends of contradicted IMU factors
 };
 
 }  // namespace pangea::vio

@@ -1,6 +1,5 @@
 #include "vio/keyframes/keyframe_finisher.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -132,20 +131,6 @@ Matrix6d RelativeCovariance(const WindowState& state, const MatrixXd& P_window, 
   floor << Vector3d::Constant(1e-8), Vector3d::Constant(1e-10);
   covariance.diagonal() += floor;
   return covariance;
-}
-
-Matrix6d CorrectionCovariance(const Matrix6d& lost, const Rigid3& T_odom_i,
-                              const Rigid3& T_odom_j) {
-  const Matrix3d R = T_odom_i.R().transpose();
-  Matrix6d J = Matrix6d::Zero();  // the columns of i in RelativeCovariance
-  J.block<3, 3>(0, 0) = R * Hat(T_odom_j.t);
-  J.block<3, 3>(0, 3) = -R;
-  J.block<3, 3>(3, 0) = -R;
-  const Matrix6d covariance = J * lost * J.transpose();
-  // A difference of large numbers: clear eigenvalues that rounding has made negative.
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(0.5 * (covariance + covariance.transpose()));
-  return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).asDiagonal() *
-         eigen.eigenvectors().transpose();
 }
 
 FinishedKeyframe FinishKeyframe(const WindowState& state, const MatrixXd& P,
