@@ -231,7 +231,7 @@ TEST_F(LinkWorld, AnEditWithAZeroByteIsRefused) {
   Run(2);
   KillHandler();
   StartHandler();
-  Run(2);
+  Run(5);  // the uplink waits 3 s for the handler that it knew
   EXPECT_EQ(summary, "1 agents, 0 keyframes in the journal") << "and no damage";
 }
 

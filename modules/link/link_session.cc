@@ -102,44 +102,54 @@ std::vector<uint8_t> UplinkSession::Seal(const LinkPacket& packet) {
   return up_->Seal(packet);
 }
 
-UplinkSession::Opened UplinkSession::Open(Bytes bytes) {
+UplinkSession::Opened UplinkSession::Open(Bytes bytes, bool connected) {
   Opened opened;
   if (bytes.size() > kMaxLinkPacketBytes) {
     opened.refused = kTooLarge;
     return opened;
   }
   if (KindOf(bytes) == LinkKind::kWelcome) {
-    return OnWelcome(bytes);
+    return OnWelcome(bytes, connected);
   }
   if (down_) {
     opened.packet = down_->Open(bytes, &opened.refused);
+    opened.two_handlers = opened.packet && std::exchange(other_welcomed_, false);
   } else {
     opened.refused = "packet before there is a session";
   }
   return opened;
 }
 
-UplinkSession::Opened UplinkSession::OnWelcome(Bytes bytes) {
+UplinkSession::Opened UplinkSession::OnWelcome(Bytes bytes, bool connected) {
+  Opened opened;
   const auto body = OpenHandshake(welcome_key_, bytes);
   if (!body) {
-    return {std::nullopt, false, "welcome is forged or damaged"};
+    opened.refused = "welcome is forged or damaged";
+    return opened;
   }
   WireReader reader(*body);
   const auto uplink_run = reader.Fixed<uint64_t>();
   const auto handler_run = reader.Fixed<uint64_t>();
   const auto hello = reader.Fixed<int64_t>();
   if (!reader.AtEnd() || uplink_run != run_ || hello <= answered_hello_) {
-    return {std::nullopt, false, "welcome answers an earlier hello"};
+    opened.refused = "welcome answers an earlier hello";
+    return opened;
   }
   if (handler_run == handler_run_) {
-    return {};
+    return opened;
+  }
+  // Also a restarted handler welcomes us like this, but then the session's one is silent.
+  other_welcomed_ = down_ && connected;
+  if (other_welcomed_) {
+    return opened;
   }
   // Hellos that are still under way do not have the new run; welcomes to them must be refused.
   answered_hello_ = last_hello_;
   handler_run_ = handler_run;
   up_ = KeyOf(agent_key_, "up", agent_id_, run_, handler_run_);
   down_ = KeyOf(agent_key_, "down", agent_id_, run_, handler_run_);
-  return {std::nullopt, true, ""};
+  opened.new_session = true;
+  return opened;
 }
 
 HandlerSession::HandlerSession(int32_t agent_id, const SecretKey& agent_key)

@@ -71,14 +71,17 @@ class UplinkSession {
   struct Opened {
     std::optional<LinkPacket> packet;  // a packet of the session
     bool new_session = false;          // the handler may not have received what was sent before
+    bool two_handlers = false;         // another one welcomed us, and the session's one is alive
     std::string refused;
   };
-  Opened Open(Bytes bytes);
+  // `connected`: the session's handler answered lately. Then no welcome replaces the session: else
+  // two handlers that have the agent's key would in turn acknowledge parts of the keyframes.
+  Opened Open(Bytes bytes, bool connected = false);
   // A hello can always be sealed, other packets only in a session; else throws std::logic_error.
   std::vector<uint8_t> Seal(const LinkPacket& packet);
 
  private:
-  Opened OnWelcome(Bytes bytes);
+  Opened OnWelcome(Bytes bytes, bool connected);
 
   const int32_t agent_id_;
   const SecretKey agent_key_;
@@ -88,6 +91,7 @@ class UplinkSession {
   uint64_t handler_run_ = 0;
   int64_t last_hello_ = 0;
   int64_t answered_hello_ = 0;  // only welcomes to later hellos are accepted
+  bool other_welcomed_ = false;
   std::optional<SessionKey> up_, down_;
 };
 

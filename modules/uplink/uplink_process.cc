@@ -184,9 +184,12 @@ void UplinkProcess::OnPose(Bytes data) {
 }
 
 void UplinkProcess::OnLinkDown(Bytes data) {
-  const UplinkSession::Opened opened = session_.Open(data);
+  const UplinkSession::Opened opened = session_.Open(data, uplink_.Connected(now_us_));
   if (!opened.refused.empty()) {
     return node_.Refuse(opened.refused);
+  }
+  if (opened.two_handlers) {
+    node_.Refuse("a second server on this link bus has our key: end it, or give it another --link");
   }
   node_.Count("bytes_down", BytesOnTheWire(channels::LinkDown(agent_id_), data));
   if (opened.new_session) {
