@@ -331,6 +331,45 @@ TEST_F(VioLiveTest, OddLivePngsAreRefusedAndCounted) {
   EXPECT_EQ(Refused("image: PNM image; only PNG and JPEG are read"), 1);
   EXPECT_EQ(Refused("image: corrupt image: neither PNG nor JPEG"), 1);
 }
+// Else the odometry collects images for ever, and says nothing of the reason.
+TEST_F(VioLiveTest, StampsInMillisecondsAreNamed) {
+  VioProcess process(bus_, options_, 0);
+  LiveInput live(process, 7, ImuNoise{});
+  PublishMessage(bus_, "CAMERA_7", ToMessage(world_.camera()));
+  const cv::Mat image = RandomTexture(752, 480, 3);
+  for (int64_t ms = 1000; ms < 1500; ms += 5) {
+    PublishImu(ms);
+    if (ms % 50 == 0) {
+      PublishImage(ms, image);
+    }
+  }
+  bus_.Drain();
+  process.Tick(1);
+  bus_.Drain();
+  EXPECT_GT(Refused("image: within a millisecond of the last one: are the stamps in microseconds?"),
+            0);
+}
+
+// A source that was restarted with a better calibration, or a second camera on one channel.
+TEST_F(VioLiveTest, AnotherCalibrationIsNotTakenInSilence) {
+  VioProcess process(bus_, options_, 0);
+  LiveInput live(process, 7, ImuNoise{});
+  camera_t camera = ToMessage(world_.camera());
+  PublishMessage(bus_, "CAMERA_7", camera);
+  PublishMessage(bus_, "CAMERA_7", camera);
+  bus_.Drain();
+  process.Tick(1);
+  bus_.Drain();
+  EXPECT_EQ(status_.num_refused, 0);
+  camera.fx += 1;
+  PublishMessage(bus_, "CAMERA_7", camera);
+  bus_.Drain();
+  process.Tick(2'000'000);
+  bus_.Drain();
+  EXPECT_EQ(Refused("camera: not as the first one, which is used: restart pangea-vio to use this"),
+            1);
+}
+
 TEST_F(VioLiveTest, LiveNonsenseIsRefused) {
   VioProcess process(bus_, options_, 0);
   LiveInput live(process, 7, ImuNoise{});

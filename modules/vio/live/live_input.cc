@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "messages/channels.h"
+#include "messages/encoding.h"
 #include "messages/messages.h"
 #include "recording/grey_image.h"
 
@@ -52,9 +53,14 @@ void LiveInput::OnCamera(const camera_t& message) {
     return;
   }
   // Later messages are ignored: a running odometry refines its calibration itself.
+  std::vector<uint8_t> bytes = EncodeMessage(message);
   if (!camera_) {
     camera_ = *camera.value;
+    camera_message_ = std::move(bytes);
     process_.Open(*camera_, noise_);
+  } else if (bytes != camera_message_) {
+    process_.node().Refuse(
+        "camera: not as the first one, which is used: restart pangea-vio to use this");
   }
 }
 
@@ -92,6 +98,10 @@ void LiveInput::OnImage(const image_t& message) {
         // a late chunk: its image was already taken or passed over
         "image: not after the last one");
     return;
+  }
+  if (newest && message.utime > *newest && message.utime < *newest + kMinImageStep_us) {
+    return process_.RefuseImage(
+        "within a millisecond of the last one: are the stamps in microseconds?");
   }
   Assembly& assembly = AssemblyOf(message);
   const auto chunk = static_cast<size_t>(message.chunk);

@@ -24,6 +24,7 @@ class LiveInput {
  public:
   static constexpr size_t kMaxAssemblies = 10;
   static constexpr int32_t kMaxImageBytes = 16'000'000;
+  static constexpr int64_t kMinImageStep_us = 1'000;  // no camera is as fast
 
   LiveInput(VioProcess& process, int32_t agent_id, const ImuNoise& noise);
 
@@ -48,7 +49,8 @@ class LiveInput {
   SensorInput sensors_;
   ImuNoise noise_;
   std::optional<CameraModel> camera_;
-  std::deque<Assembly> assemblies_;  // in order of their first chunk
+  std::vector<uint8_t> camera_message_;  // of camera_, encoded
+  std::deque<Assembly> assemblies_;      // in order of their first chunk
 };
 
 }  // namespace pangea::vio
