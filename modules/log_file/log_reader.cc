@@ -17,8 +17,11 @@ namespace pangea {
 namespace {
 
 int Open(const std::string& path) {
-  if (!std::filesystem::is_regular_file(path)) {
+  if (!std::filesystem::exists(path)) {
     throw std::runtime_error(fmt::format("{}: there is no such log", path));
+  }
+  if (!std::filesystem::is_regular_file(path)) {
+    throw std::runtime_error(fmt::format("{}: is no file, but a folder or device", path));
   }
   const int fd = open(path.c_str(), O_RDONLY | O_CLOEXEC);
   if (fd < 0) {

@@ -5,9 +5,11 @@
 
 #include <filesystem>
 #include <fstream>
+#include <functional>
 
 #include "log_file/checksums.h"
 #include "log_file/log_event.h"
+#include "log_file/log_writer.h"
 #include "messages/channels.h"
 
 namespace pangea {
@@ -185,6 +187,27 @@ TEST_F(LogReaderTest, WhatIsNoLogIsRefused) {
   file.resize(40);
   EXPECT_THAT(Read(), ElementsAre()) << "killed within the first event";
   EXPECT_EQ(reading.torn_bytes, 40);
+}
+
+std::string WhyNot(const std::function<void()>& open) {
+  try {
+    open();
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(LogFiles, TellWhyTheyCannotBeOpened) {
+  const std::string folder = testing::TempDir();
+  EXPECT_EQ(WhyNot([] { LogFileWriter("no_folder/new.lcm"); }),
+            "no_folder/new.lcm: cannot be written: No such file or directory");
+  EXPECT_EQ(WhyNot([&] { LogFileWriter writer(folder); }),
+            folder + ": cannot be written: Is a directory");
+  EXPECT_EQ(WhyNot([&] { LogReader reader(folder); }),
+            folder + ": is no file, but a folder or device");
+  EXPECT_EQ(WhyNot([] { LogReader("no_folder/new.lcm"); }),
+            "no_folder/new.lcm: there is no such log");
 }
 
 TEST(TellLosses, TellsInTheExitCode) {

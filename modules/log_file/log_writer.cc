@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cerrno>
+#include <cstring>
 #include <stdexcept>
 
 #include "log_file/log_event.h"
@@ -10,7 +12,7 @@ namespace pangea {
 
 LogFileWriter::LogFileWriter(const std::string& path) : path_(path), file_(path, std::ios::binary) {
   if (!file_) {
-    throw std::runtime_error(fmt::format("{}: cannot be written", path));
+    throw std::runtime_error(fmt::format("{}: cannot be written: {}", path, std::strerror(errno)));
   }
 }
 
