@@ -22,6 +22,7 @@ constexpr size_t kMaxCorrections = 16 * AgentHandlerProcess::kMaxAgents;
 constexpr int kManyHellos = 3;
 // After this time without a hello the uplink counts as away: it sends one every second.
 constexpr int64_t kAway_us = 3 * kSecond_us;
+constexpr size_t kMaxStrangers = 10;
 constexpr int kBusy_ms = 4;
 constexpr int kIdle_ms = 20;
 
@@ -152,7 +153,7 @@ void AgentHandlerProcess::OnLinkUp(const std::string& channel, Bytes data) {
   }
   const auto found = agents_.find(channels::AgentOf(channel, channels::kLinkUpPrefix));
   if (found == agents_.end()) {
-    return node_.Refuse("packet of an agent whose key is not in the folder of keys");
+    return RefuseStranger(channels::AgentOf(channel, channels::kLinkUpPrefix));
   }
   const int32_t agent_id = found->first;
   Agent& agent = found->second;
@@ -174,6 +175,16 @@ void AgentHandlerProcess::OnLinkUp(const std::string& channel, Bytes data) {
       TakePacket(agent_id, &agent, opened);
     }
   }
+}
+
+// Anyone can send as any agent, so only a few are named: a node tells a limited number of reasons.
+void AgentHandlerProcess::RefuseStranger(int32_t agent_id) {
+  if (strangers_.size() < kMaxStrangers) {
+    strangers_.insert(agent_id);
+  }
+  const std::string who =
+      strangers_.contains(agent_id) ? fmt::format("agent {},", agent_id) : "an agent";
+  node_.Refuse("packet of " + who + " whose key is not in the folder of keys");
 }
 
 // Lets the agent join if it has not yet.

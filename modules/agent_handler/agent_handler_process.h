@@ -11,6 +11,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 
 #include "agent_handler/agent_handler.h"
@@ -52,6 +53,7 @@ class AgentHandlerProcess : public PolledProcess {
     int64_t keyframes = 0;
   };
   void OnLinkUp(const std::string& channel, Bytes data);
+  void RefuseStranger(int32_t agent_id);
   bool HasJoined(int32_t agent_id, Agent* agent);
   void TakePacket(int32_t agent_id, Agent* agent, const HandlerSession::Opened& opened);
   // Whether the agent's uplink sent something lately.
@@ -84,6 +86,7 @@ class AgentHandlerProcess : public PolledProcess {
   Archive archive_;
   AnchorRelay anchors_;
   std::map<int32_t, Agent> agents_;          // all agents with a key
+  std::set<int32_t> strangers_;              // agents without one, the first kMaxStrangers
   std::map<MapId, Correction> corrections_;  // the newest one of each map, at most 16,000
   MissingStates missing_corrections_;        // for maps that were in the journal at the start
   int64_t now_us_ = 0;

@@ -151,7 +151,7 @@ TEST_F(LinkWorld, StrangersAreDroppedAndCounted) {
   EXPECT_GT(accepted, sent / 2);
   shout();
   Run(2);
-  EXPECT_EQ(refused["packet of an agent whose key is not in the folder of keys"],
+  EXPECT_EQ(refused["packet of agent 3, whose key is not in the folder of keys"],
             static_cast<int64_t>(recorded.size()));
   EXPECT_GT(refused["repeated or too old"], 50);
   EXPECT_GT(
@@ -263,6 +263,26 @@ TEST_F(LinkWorld, AnAgentIsShutOutThoughAnotherKeyIsBad) {
   Run(5);
   EXPECT_EQ(delivered.size(), 6u);
   EXPECT_THAT(summary, testing::HasSubstr("the folder of keys is empty: nobody can join"));
+}
+
+// But forged ones must not take the place of all other reasons.
+TEST_F(LinkWorld, AgentsWithoutAKeyAreNamed) {
+  std::set<std::string> refused;
+  server_bus.Subscribe("STATUS_agent_handler", [&](const std::string&, Bytes data) {
+    status_t status{};
+    ASSERT_TRUE(DecodeMessage(data, &status));
+    for (const counter_t& reason : status.refused) {
+      refused.insert(reason.name);
+    }
+  });
+  for (int32_t agent = 3; agent < 200; ++agent) {
+    link_bus.Publish(channels::LinkUp(agent), std::vector<uint8_t>(100));
+  }
+  Run(2);
+  EXPECT_TRUE(refused.contains("packet of agent 3, whose key is not in the folder of keys"));
+  EXPECT_TRUE(refused.contains("packet of agent 4, whose key is not in the folder of keys"));
+  EXPECT_TRUE(refused.contains("packet of an agent whose key is not in the folder of keys"));
+  EXPECT_LE(refused.size(), 15u);
 }
 
 TEST_F(LinkWorld, AnAgentOfAnotherVersionIsNamedInTheStatus) {
