@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <exception>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -55,12 +56,21 @@ void NoteNoKeys(const Site& site) {
 void List(const std::string& folder) {
   const std::vector<fs::path> folders =
       folder.empty() ? DefaultSiteFolders() : std::vector<fs::path>{folder};
+  std::exception_ptr unreadable;  // told after the sites of the other folders
   std::string text;
   for (const fs::path& one : folders) {
-    text += ListSites(one);
+    try {
+      text += ListSites(one);
+    } catch (const std::exception&) {
+      unreadable = std::current_exception();
+    }
   }
-  std::cout << (text.empty() ? "no sites here; name their folder, or: pangea-site create PATH\n"
-                             : text);
+  std::cout << (text.empty() && !unreadable
+                    ? "no sites here; name their folder, or: pangea-site create PATH\n"
+                    : text);
+  if (unreadable) {
+    std::rethrow_exception(unreadable);
+  }
 }
 
 void Create(const Arguments& arguments) {

@@ -214,7 +214,7 @@ std::vector<fs::path> DefaultSiteFolders() {
   std::error_code error;
   std::erase_if(folders, [&error](const fs::path& folder) {
     fs::directory_iterator(folder, error);
-    return static_cast<bool>(error);
+    return error && error != std::errc::permission_denied;
   });
   return folders;
 }
@@ -224,10 +224,14 @@ std::string ListSites(const fs::path& folder) {
     throw std::runtime_error(fmt::format("{}: is no folder", folder.string()));
   }
   std::vector<fs::path> sites;
+  std::string unreadable;
   for (const auto& entry : fs::directory_iterator(folder)) {
-    std::error_code ignored;
-    if (fs::exists(entry.path() / "site.yaml", ignored)) {
+    std::error_code error;
+    if (fs::exists(entry.path() / "site.yaml", error)) {
       sites.push_back(entry.path());
+    } else if (error == std::errc::permission_denied) {
+      unreadable +=
+          fmt::format("{:<24} {:>12}  {}  {}\n", "?", "", entry.path().string(), error.message());
     }
   }
   std::ranges::sort(sites);
@@ -244,7 +248,7 @@ std::string ListSites(const fs::path& folder) {
                           error.what());
     }
   }
-  return text;
+  return text + unreadable;
 }
 
 }  // namespace pangea::site

@@ -42,7 +42,8 @@ std::string ToText(const SiteInfo& info);
 // The existing ones of the default folders of sites: ~/.local/share/pangea, /var/lib/pangea.
 std::vector<std::filesystem::path> DefaultSiteFolders();
 // Lists the sites in a folder, sorted by their folders' names, one line each: name, folder, size,
-// state. Throws std::runtime_error if it is no folder.
+// state; then the folders in it that one may not read. Throws std::runtime_error if it is no
+// folder, or one may not read it.
 std::string ListSites(const std::filesystem::path& folder);
 
 }  // namespace pangea::site

@@ -189,6 +189,22 @@ TEST(SiteInfo, CountsWhatIsThere) {
   EXPECT_THAT(ListSites(site.folder.parent_path()), HasSubstr("not in use"));
 }
 
+// As /var/lib/pangea for people who are not the server's user. Else they are told to make a site.
+TEST(SiteInfo, TellsOfFoldersThatOneMayNotRead) {
+  const fs::path folder = FreshFolder("info_rights"), others = folder / ".local/share/pangea";
+  MakeSite(others / "hall", {});
+  const uid_t user = geteuid();
+  setenv("HOME", folder.c_str(), 1);
+  fs::permissions(others, fs::perms::none);
+  ASSERT_TRUE(user != 0 || seteuid(65534) == 0) << "root may read everything";
+  const std::vector<fs::path> folders = DefaultSiteFolders();
+  const std::string list = ListSites(others.parent_path());
+  ASSERT_EQ(seteuid(user), 0);
+  fs::permissions(others, fs::perms::owner_all);
+  EXPECT_THAT(folders, testing::Contains(others));
+  EXPECT_THAT(list, HasSubstr(others.string() + "  Permission denied"));
+}
+
 // The server has refused the others.
 TEST(SiteInfo, CountsNoMoreAnchorsThanThereMayBe) {
   const Site site = MakeSite(FreshFolder("info_anchors") / "hall",
