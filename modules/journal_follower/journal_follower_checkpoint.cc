@@ -40,6 +40,7 @@ void JournalFollower::RestoreCheckpoint() {
     }
     checkpoint_journal_ = reader.head().journal;
   } catch (const std::runtime_error& error) {
+    reader_->StartBehind({});  // the beginning
     Log(node_.name(), fmt::format("all of the journal is read, the checkpoint {} is not used: {}",
                                   file.string(), error.what()));
   }

@@ -306,10 +306,10 @@ class JournalCheckpoints : public testing::Test {
     Follower follower(follows_, {.place = {journal_.path() + ".checkpoint", options_, writes},
                                  .save = [](ByteWriter* writer) { writer->Put(7); },
                                  .restore =
-                                     [](ByteReader* reader) {
+                                     [this](ByteReader* reader) {
                                        int seven = 0;
                                        reader->Get(&seven);
-                                       return seven == 7 && reader->at_end();
+                                       return seven == 7 && reader->at_end() && !refuses_;
                                      },
                                  .keyframe_is_complete = is_complete_});
     follower.Tell(journal_.file());
@@ -321,6 +321,7 @@ class JournalCheckpoints : public testing::Test {
   JournalFollower::Follows follows_{.in_order = true, .matches = Which::kAll};
   std::function<bool(const KeyframeId&)> is_complete_;
   std::string options_;
+  bool refuses_ = false;  // the process cannot restore its state
 };
 
 TEST_F(JournalCheckpoints, OnlyWhatCameSinceIsRead) {
@@ -359,6 +360,13 @@ TEST_F(JournalCheckpoints, OfAnotherJournalOrOtherOptionsIsNotUsed) {
   journal_.AddMatch(0);
   journal_.AddKeyframes(3);
   EXPECT_EQ(Taken(), "m0 k0 m0 k1 m1 k2 m2 ");
+}
+
+TEST_F(JournalCheckpoints, ThatTheProcessRefusesCostsNothingOfTheJournal) {
+  journal_.AddKeyframes(2);
+  Write();
+  refuses_ = true;
+  EXPECT_EQ(Taken(), "k0 m0 k1 m1 ");
 }
 
 }  // namespace
