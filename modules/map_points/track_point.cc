@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <cmath>
+#include <cstdlib>
 #include <vector>
 
 #include "core/numerics/triangulation.h"
@@ -15,6 +16,7 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr size_t kMinRays = 3;             // of a landmark
+constexpr int32_t kMaxReach = 100;         // keyframes before and after the source
 constexpr double kMaxRelativeSigma = 0.1;  // relative to the distance
 constexpr double kMinTrackDepth = 0.3;     // m
 constexpr int kIterations = 3;
@@ -41,12 +43,14 @@ std::optional<Ray> RayIn(const MapPoses& poses, const KeyframeId& id, int32_t la
              view->pixel_jacobian(corners.front()) / kTrackPointSigma_px};
 }
 
-// The track's observations: a track is one contiguous run of keyframes.
+// The track's observations: a track is one contiguous run of keyframes. Bounded: an agent that
+// stands still sees a landmark for hours.
 std::vector<Ray> RaysOf(const MapPoses& poses, const KeyframeId& id, int32_t landmark_id,
                         KeyframeStore* store) {
   std::vector<Ray> rays;
   for (const int step : {-1, 1}) {
-    for (int32_t seq = step < 0 ? id.seq : id.seq + 1;; seq += step) {
+    for (int32_t seq = step < 0 ? id.seq : id.seq + 1; std::abs(seq - id.seq) <= kMaxReach;
+         seq += step) {
       const auto ray = RayIn(poses, {id.map, seq}, landmark_id, store);
       if (!ray) {
         break;

@@ -3,9 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <memory>
 #include <random>
 
 #include "core/testing/test_cameras.h"
+#include "core/testing/test_record_store.h"
 
 namespace pangea {
 namespace {
@@ -63,6 +65,33 @@ TEST(TrackPoint, SaysNothingWhenTheRaysDoNot) {
   EXPECT_FALSE(PointSeenWith({right, right}, 0.3, p));         // too few
   EXPECT_FALSE(PointSeenWith({right, right, right}, 0, p));    // all from one place
   EXPECT_FALSE(PointSeenWith({right, wrong, right}, 0.3, p));  // one of another point
+}
+
+// An agent that stands still sees the same landmark for hours.
+TEST(TrackPoint, ReadsABoundedPartOfALongTrack) {
+  constexpr int kKeyframes = 2000;
+  const Vector3d p(3, 0.5, 0.2);
+  MapPoses poses;
+  const auto records = std::make_shared<test::TestRecordStore>(kKeyframes);
+  KeyframeStore store({}, records);
+  for (int i = 0; i < kKeyframes; ++i) {
+    Keyframe keyframe;
+    keyframe.id = {kMap, i};
+    keyframe.camera = EurocTestCamera();
+    const Rigid3 T_map_body(Eigen::Quaterniond::Identity(), {0, 0.01 * (i % 40), 0});
+    Corner corner;
+    corner.pixel = keyframe.camera.Project((T_map_body * keyframe.camera.T_body_cam).Inverse() * p)
+                       .value()
+                       .cast<float>();
+    corner.landmark_id = 7;
+    keyframe.corners = {corner};
+    poses[keyframe.id] = T_map_body;
+    store.Add(keyframe);
+  }
+  const auto point = PointOfTrack(poses, *store.Find({kMap, kKeyframes / 2}), 0, &store);
+  ASSERT_TRUE(point);
+  EXPECT_LT((point->p_map - p).norm(), 0.01);
+  EXPECT_LT(records->num_read, 250);
 }
 
 }  // namespace

@@ -31,6 +31,7 @@ class TestRecordStore : public RecordStore {
       problem_ = "broken";
       return false;
     }
+    ++num_read;
     std::ranges::copy(records_[offset], record.begin());
     return true;
   }
@@ -39,6 +40,7 @@ class TestRecordStore : public RecordStore {
   size_t size() const { return records_.size(); }
 
   bool broken = false;
+  int num_read = 0;
 
  private:
   size_t max_records_;
