@@ -16,11 +16,13 @@ namespace pangea {
 namespace {
 
 constexpr uint32_t kCheckpointFormat = 3;
-// Bounds: on matches kept for retransmission (beyond it the oldest are dropped), and on keyframes
-// that wait in a catch-up or for their turn (beyond it the first are recognised at once).
+// Bounds: on matches kept for retransmission (beyond it the oldest are dropped), on keyframes that
+// wait in a catch-up or for their turn (beyond it the first are recognised at once), and on the
+// journal's matches that wait for their keyframes (beyond it keyframes are recognised again): as
+// many as max_keyframes may be, with about 300 bytes each.
 constexpr size_t kMaxSentPerMap = 2000;
 constexpr size_t kMaxHeld = 2000;
-constexpr size_t kMaxKnownMatches = 100'000;
+constexpr size_t kMaxKnownMatches = 1'000'000;
 
 }  // namespace
 
@@ -110,7 +112,7 @@ bool PlaceRecognitionProcess::OnKnownMatch(PlaceMatch match) {
   const KeyframeId query = match.query;
   if (query.seq >= journal_.next(query.map) && known_matches_.size() < kMaxKnownMatches) {
     // Remember needs only the ids of the candidates.
-    match.rejected.clear();
+    match.rejected = {};
     for (PlaceCandidate& candidate : match.candidates) {
       candidate.corner_matches = {};
     }

@@ -251,6 +251,34 @@ TEST(PlaceRecognitionProcess, ARestartPublishesOnlyWhatTheJournalLacksAndMissesN
   EXPECT_GT(after.Match(1).num_candidates, 0);
 }
 
+// A day of several agents.
+TEST(PlaceRecognitionProcess, ARestartKnowsEveryMatchOfALargeJournal) {
+  constexpr int kMatches = 150'000;
+  test::TestWorld world(5);
+  Server server;
+  server.Have({{kMapA, kMatches - 1}});
+  PlaceMatch match;
+  for (int seq = 0; seq < kMatches; ++seq) {
+    match.query = {kMapA, seq};
+    server.Retransmit("PLACE_MATCH", Encode(ToMessage(match)));
+  }
+  Keyframe last = world.See(match.query, {0, 0, 1.5}, 0);
+  last.edge = OdometryEdge{0, {}, Matrix6d::Identity()};
+  have_t have{};
+  have.num_maps = 1;
+  have.maps.push_back(ToMessage(kMapA));
+  have.highest_seq.push_back(kMatches - 1);
+  have.num_gaps = 1;
+  have.gaps.resize(1);
+  have.gaps[0].map = ToMessage(kMapA);
+  have.gaps[0].to_seq = kMatches - 2;
+  PublishMessage(server.bus, "HAVE", have);
+  server.bus.Drain();
+  server.Retransmit("KEYFRAME_1", Encode(ToMessage(last)));
+  server.Fused({kMapA});
+  EXPECT_TRUE(server.matches.empty());  // the journal has it
+}
+
 TEST(PlaceRecognitionProcess, AfterARestartTheKindsAreThoseOfTheGroups) {
   test::TestWorld world(9);
   const auto keyframes = Round(world, kMapA, kRound + 5);
