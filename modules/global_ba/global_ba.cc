@@ -181,15 +181,19 @@ GlobalBa::Basis GlobalBa::BasisOf(const MapState& state) {
 
 GlobalBa::StatePointer GlobalBa::NextDue() const {
   for (const auto& [map, state] : states_.by_map()) {
-    const auto known = refined_.find(state->group);
     if (map == state->group && state->num_constraints > 0 &&
-        state->keyframes.size() >= kMinKeyframes && states_.IsCurrent(*state) &&
-        (known == refined_.end() || known->second.whole_is_due ||
-         known->second.basis != BasisOf(*state))) {
+        state->keyframes.size() >= kMinKeyframes && states_.IsCurrent(*state) && IsDue(*state)) {
       return state;
     }
   }
   return nullptr;
+}
+
+bool GlobalBa::IsDue(const MapState& state) const {
+  const auto known = refined_.find(state.group);
+  return known == refined_.end() ||
+         (known->second.state.revision < state.revision &&
+          (known->second.whole_is_due || known->second.basis != BasisOf(state)));
 }
 
 bool GlobalBa::IsLocal(const MapState& state, const MapPoses& poses) const {

@@ -14,9 +14,10 @@
 // keyframes and matches (local_part.h); the rest is fixed at the last refinement. It is adjusted as
 // a whole if it has no refinement, if it has grown by half since its last whole adjustment (as
 // after a fusion of two groups), or if a local adjustment has moved adjusted keyframes by more than
-// max_shift_m. In all cases the refinement contains the whole group. The work is done in pieces,
-// and abandoned when a message about its maps arrives. Map frame: that of the state. One thread, no
-// clock: the same calls in the same order give the same bytes.
+// max_shift_m. In all cases the refinement contains the whole group. A state is adjusted once: the
+// pose graph takes a second refinement of the same revision for a repeat. The work is done in
+// pieces, and abandoned when a message about its maps arrives. Map frame: that of the state. One
+// thread, no clock: the same calls in the same order give the same bytes.
 
 #include <cstdint>
 #include <map>
@@ -118,6 +119,7 @@ class GlobalBa {
   static constexpr size_t kMaxMatched = 200'000;  // candidates; further ones are not used
 
   StatePointer NextDue() const;
+  bool IsDue(const MapState& state) const;
   bool IsLocal(const MapState& state, const MapPoses& poses) const;
   void Begin(StatePointer state);
   bool BeginAgain();

@@ -34,8 +34,9 @@ class GlobalBaProcess : public Process {
                   const CheckpointPlace& checkpoint = {});
 
   void Tick(int64_t now_utime) override;
-  // Adjusts every group that is due, to the end.
+  // Adjusts every group that is due, to the end. The pose graph's answers may give more to do.
   void Finish();
+  bool HasWork() const { return global_ba_.HasWork(); }
 
  private:
   void Save(ByteWriter* writer) const;

@@ -72,25 +72,24 @@ class Server {
     for (const Constraint& constraint : messages.constraints) {
       ba_.Take(constraint);
     }
-    MapState state = messages.state;
-    state.revision = ++revision_;
-    for (KeyframePose& pose : state.keyframes) {
-      const auto told = told_.find(pose.id);
-      pose.T_map_body = told == told_.end() ? pose.T_map_body : told->second;
-    }
-    ba_.Take(state);
+    state_ = messages.state;
+    PublishState();
   }
 
-  // Does all work that is due.
+  // Does all work that is due, and publishes the state again after each refinement.
   MapState Finish() {
     MapState refined;
     while (ba_.HasWork()) {
-      if (auto state = ba_.Advance()) {
+      if (const auto state = ba_.Advance()) {
+        EXPECT_GT(state->revision, refined.revision) << "the pose graph takes it for a repeat";
         refined = *state;
-        state->revision = ++revision_;
+        while (ba_.HasWork()) {  // before the pose graph answers
+          EXPECT_FALSE(ba_.Advance()) << "a second refinement of the same state";
+        }
         for (const KeyframePose& pose : state->keyframes) {
           told_[pose.id] = pose.T_map_body;
         }
+        PublishState();
       }
     }
     return refined;
@@ -116,8 +115,19 @@ class Server {
     return options;
   }
 
+  void PublishState() {
+    MapState state = state_;
+    state.revision = ++revision_;
+    for (KeyframePose& pose : state.keyframes) {
+      const auto told = told_.find(pose.id);
+      pose.T_map_body = told == told_.end() ? pose.T_map_body : told->second;
+    }
+    ba_.Take(state);
+  }
+
   GlobalBa ba_;
   int64_t revision_ = 0;
+  MapState state_;  // with the poses of the pose graph alone
   MapPoses told_;
   MapState first_;
 };

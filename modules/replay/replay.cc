@@ -101,7 +101,7 @@ class Server {
       posegraph_->Finish();
       bus_.Drain();
     }
-    if (global_ba_) {
+    while (global_ba_ && global_ba_->HasWork()) {
       global_ba_->Finish();
       bus_.Drain();
     }
