@@ -116,7 +116,9 @@ class GlobalBa {
   };
   static constexpr KeyframeStoreOptions kStore{.keep_preintegration = true};
   static Basis BasisOf(const MapState& state);
-  static constexpr size_t kMaxMatched = 200'000;  // candidates; further ones are not used
+  // Candidates; further ones are not used. Place recognition remembers 100,000 keyframes, and finds
+  // up to eight candidates for each.
+  static constexpr size_t kMaxMatched = 1'000'000;
 
   StatePointer NextDue() const;
   bool IsDue(const MapState& state) const;

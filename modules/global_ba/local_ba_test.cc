@@ -310,6 +310,28 @@ TEST(LocalBa, ALateResultMovesItsEnds) {
   EXPECT_EQ(before.begin()->second.t, after.begin()->second.t);
 }
 
+// The matches of days.
+TEST(LocalBa, ManyEarlierMatchesChangeNothing) {
+  const BaTestMessages messages = Messages();
+  BaTestMessages earlier = Chosen(messages, OfFirstTwo);
+  Server few(kLocal), many(kLocal);
+  for (Server* server : {&few, &many}) {
+    server->Take(earlier);
+    server->Finish();
+  }
+  PlaceMatch match;
+  match.candidates.resize(1);
+  for (int i = 0; i < 300'000; ++i) {
+    match.query = {{9, 9}, i};
+    match.candidates[0].match = {{9, 10}, i};
+    earlier.matches.push_back(match);
+  }
+  many.Take(earlier);
+  few.Take(Chosen(messages, Later));
+  many.Take(Chosen(messages, Later));
+  EXPECT_LT(LargestDifference(few.Finish(), many.Finish()), 1e-9);
+}
+
 TEST(LocalBa, OptionsOutOfBoundsAreRefusedByName) {
   for (const std::string text :
        {"keyframes: -1", "max_neighbours: 2000000", "whole_growth: 0.9", "max_shift_m: -0.1"}) {
