@@ -332,6 +332,33 @@ TEST(LocalBa, ManyEarlierMatchesChangeNothing) {
   EXPECT_LT(LargestDifference(few.Finish(), many.Finish()), 1e-9);
 }
 
+// An agent that stands still sees the same landmarks for hours.
+TEST(LocalBa, APartIsBoundedWhereAllSeeTheSame) {
+  constexpr int kAll = 2000, kNeighbours = 20;
+  const MapId map{1, 100};
+  MapPoses state;
+  AdjustedGroup adjusted;
+  KeyframeStore store;
+  for (int seq = 0; seq < kAll; ++seq) {
+    Keyframe keyframe;
+    keyframe.id = {map, seq};
+    keyframe.corners.resize(5);
+    for (int i = 0; i < 5; ++i) {
+      keyframe.corners[i].landmark_id = i;
+    }
+    store.Add(keyframe);
+    state[keyframe.id] = {};
+    if (seq + 1 < kAll) {
+      adjusted.keyframes[keyframe.id] = KeyframeState{};
+    }
+  }
+  const LocalPart part = ChooseLocalPart(state, adjusted, {}, {}, kNeighbours, &store);
+  EXPECT_EQ(part.moving.size(), 1u + kNeighbours);
+  EXPECT_TRUE(part.moving.contains({map, kAll - 1}));
+  EXPECT_TRUE(part.fixed.contains({map, kAll - 50}));
+  EXPECT_LT(part.fixed.size(), 500u);
+}
+
 TEST(LocalBa, OptionsOutOfBoundsAreRefusedByName) {
   for (const std::string text :
        {"keyframes: -1", "max_neighbours: 2000000", "whole_growth: 0.9", "max_shift_m: -0.1"}) {

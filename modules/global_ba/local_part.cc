@@ -1,11 +1,16 @@
 #include "global_ba/local_part.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <iterator>
 #include <utility>
 
 namespace pangea {
 namespace {
+
+// An agent that stands still sees the same landmarks for hours: keyframes further away, in seq,
+// count as seeing none of them.
+constexpr int32_t kMaxReach = 100;
 
 class Chooser {
  public:
@@ -119,7 +124,8 @@ class Chooser {
 
   // Adds `near` if it belongs to Along(id); false if not.
   bool Add(const KeyframeId& id, const KeyframeId& near, bool* joined, Shared* along) {
-    const int shared = near.map == id.map ? NumShared(id, near) : 0;
+    const bool is_near = near.map == id.map && std::abs(near.seq - id.seq) <= kMaxReach;
+    const int shared = is_near ? NumShared(id, near) : 0;
     if (near.map != id.map || (shared == 0 && *joined)) {
       return false;
     }
