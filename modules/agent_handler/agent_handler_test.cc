@@ -158,6 +158,23 @@ PlaceMatch MatchOf(int32_t seq, int num_candidates) {
   return match;
 }
 
+TEST(JournalIndex, AKeyframeThatFillsAGapLacksItsMatch) {
+  JournalIndex index;
+  const auto add = [&index](int seq) {
+    index.AddKeyframe({kMap, seq}, {seq, 1});
+    index.Add(MatchOf(seq, 0), {100 + seq, 1});
+  };
+  add(0);
+  add(3);
+  EXPECT_FALSE(index.MissingMatches(kMap, 3));
+  index.AddKeyframe({kMap, 1}, {1, 1});
+  const auto gap = index.MissingMatches(kMap, 3);
+  ASSERT_TRUE(gap);
+  EXPECT_EQ(gap->from_seq, 1);
+  add(1);
+  EXPECT_FALSE(index.MissingMatches(kMap, 3));
+}
+
 TEST(JournalIndex, KnowsWhatIsOutstanding) {
   JournalIndex index;
   for (int seq = 0; seq < 6; ++seq) {

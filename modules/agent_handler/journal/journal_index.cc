@@ -12,9 +12,13 @@ const JournalIndex::MapIndex* JournalIndex::FindMap(const MapId& id) const {
 }
 
 JournalIndex::Added JournalIndex::AddKeyframe(const KeyframeId& id, const JournalPlace& place) {
-  const bool added = maps_[id.map].keyframes.emplace(id.seq, place).second;
-  num_keyframes_ += added ? 1 : 0;
-  return added ? Added::kNew : Added::kRepeat;
+  MapIndex& map = maps_[id.map];
+  if (!map.keyframes.emplace(id.seq, place).second) {
+    return Added::kRepeat;
+  }
+  map.matched_below = std::min(map.matched_below, id.seq);  // it may fill a gap
+  ++num_keyframes_;
+  return Added::kNew;
 }
 
 JournalIndex::Added JournalIndex::Check(const PlaceMatch& match) const {
@@ -52,8 +56,9 @@ void JournalIndex::Add(const PlaceMatch& match, const JournalPlace& place) {
       ++num_missing_results_;
     }
   }
-  while (map.matches.contains(map.matched_below)) {
-    ++map.matched_below;
+  for (auto it = map.keyframes.lower_bound(map.matched_below);
+       it != map.keyframes.end() && map.matches.contains(it->first); ++it) {
+    map.matched_below = it->first + 1;
   }
 }
 

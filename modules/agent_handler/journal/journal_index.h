@@ -69,7 +69,7 @@ class JournalIndex {
     std::map<int32_t, JournalPlace> matches;
     std::map<int32_t, std::map<int64_t, JournalPlace>> results;  // by the constraint's id
     std::map<int32_t, std::set<int64_t>> missing_results;
-    // Every seq below this has its match.
+    // Every keyframe below this has its match.
     int32_t matched_below = 0;
   };
   const MapIndex* FindMap(const MapId& id) const;
