@@ -36,22 +36,33 @@ bool KnownConstraints::IsRedundant(const KeyframeId& query, const KeyframeId& ma
     return false;
   }
   return query.map == match.map ? nearby.count >= options_.min_nearby
-                                : std::ssize(KnownTo(query, match)) >= options_.min_between_maps;
+                                : ManyBetweenMaps(query, match);
 }
 
-std::vector<KnownConstraints::Known> KnownConstraints::KnownTo(const KeyframeId& query,
-                                                               const KeyframeId& match) const {
-  const auto maps = std::minmax(query.map, match.map);
-  std::vector<Known> known_to;
-  if (const auto found = by_maps_.find(maps); found != by_maps_.end()) {
-    for (const auto& [seq_a, known] : found->second) {
-      const KeyframeId a{maps.first, known.seq_a}, b{maps.second, known.seq_b};
-      if (RestsOn(query, match, known.query_is_a ? a : b)) {
-        known_to.push_back(known);
-      }
+const KnownConstraints::BySeq* KnownConstraints::Between(const KeyframeId& query,
+                                                         const KeyframeId& match) const {
+  const auto found = by_maps_.find(std::minmax(query.map, match.map));
+  return found == by_maps_.end() ? nullptr : &found->second;
+}
+
+bool KnownConstraints::Precedes(const Known& known, const KeyframeId& query,
+                                const KeyframeId& match) {
+  const auto [a, b] = std::minmax(query, match);
+  return RestsOn(
+      query, match,
+      known.query_is_a ? KeyframeId{a.map, known.seq_a} : KeyframeId{b.map, known.seq_b});
+}
+
+bool KnownConstraints::ManyBetweenMaps(const KeyframeId& query, const KeyframeId& match) const {
+  const BySeq* const between = Between(query, match);
+  int count = 0;
+  if (between != nullptr) {
+    for (auto it = between->begin(); it != between->end() && count < options_.min_between_maps;
+         ++it) {
+      count += Precedes(it->second, query, match) ? 1 : 0;
     }
   }
-  return known_to;
+  return count >= options_.min_between_maps;
 }
 
 void KnownConstraints::Save(ByteWriter* writer) const {
@@ -90,12 +101,17 @@ void KnownConstraints::Restore(ByteReader* reader) {
 KnownConstraints::Nearby KnownConstraints::NearbyOf(const KeyframeId& query,
                                                     const KeyframeId& match,
                                                     const KeyframeStore& store) const {
+  const BySeq* const between = Between(query, match);
+  if (between == nullptr) {
+    return {0, std::numeric_limits<double>::infinity()};
+  }
   const auto [a, b] = std::minmax(query, match);
   std::vector<double> sigmas;
   double known = 0;
-  for (const Known& near : KnownTo(query, match)) {
-    if (std::abs(near.seq_a - a.seq) > kMaxSeqDistance ||
-        std::abs(near.seq_b - b.seq) > kMaxSeqDistance) {
+  const auto end = between->upper_bound(a.seq + kMaxSeqDistance);
+  for (auto it = between->lower_bound(a.seq - kMaxSeqDistance); it != end; ++it) {
+    const Known& near = it->second;
+    if (std::abs(near.seq_b - b.seq) > kMaxSeqDistance || !Precedes(near, query, match)) {
       continue;
     }
     const auto path_a = PathBetween(a.map, a.seq, near.seq_a, store);

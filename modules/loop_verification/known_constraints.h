@@ -70,11 +70,15 @@ class KnownConstraints {
     bool query_is_a = false;
     double sigma_m = 0;  // of the position, in the worst direction
   };
-  // The accepted constraints between the candidate's maps that precede it (RestsOn).
-  std::vector<Known> KnownTo(const KeyframeId& query, const KeyframeId& match) const;
+  using BySeq = std::multimap<int32_t, Known>;  // key: seq_a
+  // The accepted constraints between the candidate's maps; null if there are none.
+  const BySeq* Between(const KeyframeId& query, const KeyframeId& match) const;
+  // Whether the constraint, between the candidate's maps, precedes it (RestsOn).
+  static bool Precedes(const Known& known, const KeyframeId& query, const KeyframeId& match);
+  bool ManyBetweenMaps(const KeyframeId& query, const KeyframeId& match) const;
 
   KnownConstraintOptions options_;
-  std::map<std::pair<MapId, MapId>, std::multimap<int32_t, Known>> by_maps_;  // inner key: seq_a
+  std::map<std::pair<MapId, MapId>, BySeq> by_maps_;
 };
 
 }  // namespace pangea
