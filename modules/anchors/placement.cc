@@ -177,7 +177,8 @@ PlacementResult Place(const AnchorEdit& edit, const OdometryTrack& track, int ho
     }
     return Held(edit, track, keyframe->utime, Relative(edit, keyframe->T_odom_body), holds);
   }
-  if (track.keyframes().empty()) {
+  // A quick test: an edit whose time is wrong waits for ever, and is tried with each keyframe.
+  if (track.keyframes().empty() || track.keyframes().rbegin()->second.utime < edit.utime) {
     return AwaitsKeyframe();
   }
   const bool on_surface = edit.placement == AnchorEdit::Placement::kPixel;
