@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <compare>
 #include <map>
 #include <optional>
 #include <set>
@@ -15,8 +16,17 @@ namespace pangea {
 namespace {
 
 constexpr double kMinParallax = 0.02;  // radians, between two rays of the track
+// An agent that stands still sees a landmark for hours. The equations of all keyframes that see it
+// are dense, so a longer track is cut: each part is a landmark.
+constexpr size_t kMaxOfTrack = 100;
 
-using TrackId = std::pair<MapId, int32_t>;
+// A part of a track of the odometry.
+struct TrackId {
+  MapId map;
+  int32_t landmark_id = kNoLandmark;
+  int part = 0;
+  auto operator<=>(const TrackId&) const = default;
+};
 
 struct Track {
   std::vector<BaObservation> own;
@@ -43,11 +53,15 @@ class Builder {
         if (id == kNoLandmark || !seen.view->has_ray(corner)) {
           continue;
         }
-        std::vector<BaObservation>& own = tracks_[{keyframe.id.map, id}].own;
+        const std::vector<BaObservation>& so_far = tracks_[TrackOf(seen, corner)].own;
         // Of several corners of one landmark only the first is used.
-        if (own.empty() || own.back().keyframe != i) {
-          own.push_back(Observe(seen, corner, kTrackSigma_px));
+        if (!so_far.empty() && so_far.back().keyframe == i) {
+          continue;
         }
+        if (so_far.size() == kMaxOfTrack) {
+          cuts_[{keyframe.id.map, id}].push_back(i);
+        }
+        tracks_[TrackOf(seen, corner)].own.push_back(Observe(seen, corner, kTrackSigma_px));
       }
     }
   }
@@ -62,9 +76,9 @@ class Builder {
       if (!seen_a.Shows(corner_a) || !seen_b.Shows(corner_b)) {
         continue;
       }
-      const TrackId a = seen_a.TrackOf(corner_a);
-      const TrackId b = seen_b.TrackOf(corner_b);
-      const bool both = a.second != kNoLandmark && b.second != kNoLandmark;
+      const TrackId a = TrackOf(seen_a, corner_a);
+      const TrackId b = TrackOf(seen_b, corner_b);
+      const bool both = a.landmark_id != kNoLandmark && b.landmark_id != kNoLandmark;
       // However many keyframes match two tracks, this is a single match, right or wrong.
       if (both && (a == b || !met_.insert(std::minmax(a, b)).second)) {
         continue;
@@ -106,11 +120,17 @@ class Builder {
     bool Shows(int corner) const {
       return corner < static_cast<int>(view->keyframe().corners.size()) && view->has_ray(corner);
     }
-    TrackId TrackOf(int corner) const {
-      return {view->keyframe().id.map, CornerAt(corner).landmark_id};
-    }
   };
   Seen See(int keyframe) const { return {keyframe, store_->Find(world_->keyframes[keyframe].id)}; }
+
+  TrackId TrackOf(const Seen& seen, int corner) const {
+    TrackId track{seen.view->keyframe().id.map, seen.CornerAt(corner).landmark_id};
+    if (const auto cuts = cuts_.find({track.map, track.landmark_id}); cuts != cuts_.end()) {
+      const auto after = std::ranges::upper_bound(cuts->second, seen.keyframe);
+      track.part = static_cast<int>(after - cuts->second.begin());
+    }
+    return track;
+  }
 
   static BaObservation Observe(const Seen& seen, int corner, double sigma) {
     return {seen.keyframe, -1, seen.view->ray(corner), seen.view->pixel_jacobian(corner) / sigma};
@@ -119,7 +139,7 @@ class Builder {
   void AddMatch(const TrackId& track, const Seen& seen, int corner, double share) {
     const auto known = tracks_.find(track);
     // If several keyframes of one track match the same corner, it is one measurement.
-    if (track.second != kNoLandmark && known != tracks_.end() &&
+    if (track.landmark_id != kNoLandmark && known != tracks_.end() &&
         matched_.insert({track, seen.keyframe, corner}).second) {
       const double sigma = CornerSigma(seen.CornerAt(corner), kMatchSigma_px);
       known->second.matched.push_back(Observe(seen, corner, sigma / share));
@@ -155,6 +175,8 @@ class Builder {
   BaWorld* world_;
   std::vector<Rigid3> T_map_cam_;
   std::map<TrackId, Track> tracks_;
+  // By map and landmark_id, of long tracks: the keyframes at which new parts begin, ascending.
+  std::map<std::pair<MapId, int32_t>, std::vector<int>> cuts_;
   std::set<std::pair<TrackId, TrackId>> met_;
   std::set<std::tuple<TrackId, int, int>> matched_;  // (track, keyframe, corner)
 };

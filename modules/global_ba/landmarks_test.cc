@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/testing/test_cameras.h"
 #include "global_ba/ba_test_world.h"
 #include "global_ba/group_world.h"
 
@@ -285,6 +286,48 @@ TEST(Landmarks, SeveralCornersOfALandmarkAreOneObservationInAnyOrder) {
   const BaWorld twice = group.World();
   EXPECT_EQ(twice.landmarks.size(), once.landmarks.size());
   EXPECT_EQ(twice.observations.size(), once.observations.size());
+}
+
+// An agent comes, and then stands still for hours before the same landmarks.
+TEST(Landmarks, ATrackThatDoesNotEndIsCut) {
+  constexpr int kMoving = 20, kStanding = 400, kPoints = 30;
+  const MapId map{1, 100};
+  KeyframeStore store;
+  MapPoses poses;
+  for (int seq = 0; seq < kMoving + kStanding; ++seq) {
+    Keyframe keyframe;
+    keyframe.id = {map, seq};
+    keyframe.utime = int64_t{5'000'000} * seq;
+    keyframe.camera = EurocTestCamera();
+    keyframe.T_odom_body.t.y() = -0.1 * std::max(0, kMoving - seq);
+    if (seq > 0) {
+      keyframe.edge = OdometryEdge{seq - 1, {}, 1e-4 * Matrix6d::Identity()};
+      keyframe.edge->T_from_this.t.y() = seq <= kMoving ? 0.1 : 0;
+    }
+    const Rigid3 T_cam_map = keyframe.T_odom_cam().Inverse();
+    for (int i = 0; i < kPoints; ++i) {
+      const Eigen::Vector3d p_cam =
+          T_cam_map * (EurocTestCamera().T_body_cam *
+                       Eigen::Vector3d(0.1 * (i % 6) - 0.3, 0.1 * (i / 6) - 0.2, 3));
+      const auto pixel = keyframe.camera.Project(p_cam);
+      if (pixel && keyframe.camera.Contains(*pixel)) {
+        Corner& corner = keyframe.corners.emplace_back();
+        corner.pixel = pixel->cast<float>();
+        corner.landmark_id = i;
+      }
+    }
+    poses[keyframe.id] = keyframe.T_odom_body;
+    store.Add(std::move(keyframe));
+  }
+  const BaWorld world = MakeGroupWorld(poses, {}, &store);
+  std::map<int, int> times_seen;
+  for (const BaObservation& seen : world.observations) {
+    ++times_seen[seen.landmark];
+  }
+  EXPECT_GE(world.landmarks.size(), size_t{kPoints} / 2);
+  for (const auto& [landmark, times] : times_seen) {
+    EXPECT_LE(times, 100);
+  }
 }
 
 }  // namespace
