@@ -157,6 +157,12 @@ bool IsInput(const LoggedMessage& message) {
   return !message.own && (IsFromAgents(message.channel) || IsMatchOrResult(message.channel));
 }
 
+// Whether it was queued before anyone answered the message before it: so a result of inter_map_ba
+// comes before those of fusion for the same match.
+bool FollowsAtOnce(const LoggedMessage& message) {
+  return !message.own && IsMatchOrResult(message.channel);
+}
+
 // Name of the sending process; empty for agents.
 std::string Speaker(const LogEvent& event) {
   if (event.channel == channels::kPlaceMatch) {
@@ -356,12 +362,18 @@ int64_t ReplayPart(const fs::path& log, const ReplayedPart& part, const fs::path
   Recorder recorder(bus, part.options, out_log);
   recorder.SetTime(*begin_utime);
   bool finished = false;
+  bool queued = false;
   for (size_t i = 0; i < messages.size(); ++i) {
-    recorder.SetTime(messages[i].utime);
+    if (!queued) {
+      recorder.SetTime(messages[i].utime);
+    }
     progress.Update(static_cast<int64_t>(i), std::ssize(messages), "messages");
     if (!messages[i].own) {
       bus.Publish(messages[i].channel, messages[i].data);
-      bus.Drain();
+      queued = i + 1 < messages.size() && FollowsAtOnce(messages[i + 1]);
+      if (!queued) {
+        bus.Drain();
+      }
     } else if (i >= after_input && !finished && !IsMatchOrResult(messages[i].channel)) {
       // The process sent this message, although no input is left: it worked because the bus was
       // quiet. (A match or a result may only have taken its time.)

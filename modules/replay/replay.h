@@ -51,7 +51,8 @@ struct ReplayedPart {
 // the log, in its order: keyframes, anchor edits, matches, verification results and states of the
 // other processes, and, up to the checkpoint, all matches and verification results. Writes this
 // input and the processes' own messages, at the points where they are sent now. The log of a replay
-// gives the same messages again. In a live session, some messages depend on what arrived while a
+// gives the same messages again (place_recognition and fusion without inter_map_ba: perhaps in
+// another order). In a live session, some messages depend on what arrived while a
 // process was busy: matches and states may then differ without any error. Returns how many matches
 // and verification results were taken from the log instead of being computed. Throws as Replay
 // does.

@@ -91,6 +91,62 @@ TEST(Replay, AMapInTwoLogsIsRefused) {
   std::filesystem::remove(copy);
 }
 
+// Bytes of the messages on a channel, in the log's order.
+std::vector<std::vector<uint8_t>> On(const std::string& channel, const std::string& log) {
+  std::vector<std::vector<uint8_t>> all;
+  ReadLog(log, [&](const LogEvent& event) {
+    if (event.channel == channel) {
+      all.emplace_back(event.data.begin(), event.data.end());
+    }
+  });
+  return all;
+}
+
+// Each match between maps gets a candidate in the keyframe's own map, too.
+LogEvent WithCandidateInOwnMap(const LogEvent& event, std::vector<uint8_t>* data) {
+  place_match_t message{};
+  if (event.channel != "PLACE_MATCH" || !DecodeMessage(event.data, &message)) {
+    return event;
+  }
+  PlaceMatch match = *Parse(message).value;
+  if (!match.candidates.empty() && match.query.seq > 0) {
+    PlaceCandidate candidate;
+    candidate.match = {match.query.map, 0};
+    candidate.kind = PlaceKind::kIntra;
+    match.candidates.insert(match.candidates.begin(), candidate);
+  }
+  *data = EncodeMessage(ToMessage(match));
+  return {.utime = event.utime, .channel = event.channel, .data = *data};
+}
+
+// Results of both verifying processes for one match, of which only one process runs again.
+TEST(Replay, OfOneVerifierKeepsTheOrderOfResults) {
+  const std::string log = testing::TempDir() + "replay_order.lcm";
+  std::ostringstream out;
+  Progress progress("replay", out, false, [] { return 0.0; });
+  Replay({kSample}, {}, kUntil_s, log, progress);
+  {
+    LogFileWriter file(log + ".both");
+    ReadLog(log, [&](const LogEvent& event) {
+      std::vector<uint8_t> data;
+      const LogEvent written = WithCandidateInOwnMap(event, &data);
+      file.Write(written.utime, written.channel, written.data);
+    });
+  }
+  ReplayedPart part;
+  part.processes = {"inter_map_ba", "fusion"};
+  ReplayPart(log + ".both", part, log + ".1", progress);
+  ASSERT_GT(On("CONSTRAINT", log + ".1").size(), On("CONSTRAINT", log).size());
+  for (const char* process : {"inter_map_ba", "fusion"}) {
+    part.processes = {process};
+    ReplayPart(log + ".1", part, log + ".part", progress);
+    EXPECT_EQ(On("CONSTRAINT", log + ".part"), On("CONSTRAINT", log + ".1")) << process;
+  }
+  for (const char* suffix : {"", ".both", ".1", ".part"}) {
+    std::filesystem::remove(log + suffix);
+  }
+}
+
 // The sample's first seconds, with an anchor that agent 1 placed after one of its keyframes.
 class ReplayOfAnchors : public testing::Test {
  protected:
@@ -128,17 +184,6 @@ class ReplayOfAnchors : public testing::Test {
     edit.T_ref_anchor.t = {1, 0, 0};
     return ToMessage(edit);
   }
-  // Bytes of the messages on a channel, in the log's order.
-  static std::vector<std::vector<uint8_t>> On(const std::string& channel, const std::string& log) {
-    std::vector<std::vector<uint8_t>> all;
-    ReadLog(log, [&](const LogEvent& event) {
-      if (event.channel == channel) {
-        all.emplace_back(event.data.begin(), event.data.end());
-      }
-    });
-    return all;
-  }
-
   const std::string log_ = testing::TempDir() + "replay_anchors.lcm";
   std::ostringstream out_;
   Progress progress_{"replay", out_, false, [] { return 0.0; }};
