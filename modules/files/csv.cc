@@ -56,13 +56,13 @@ std::vector<CsvRow> ReadCsv(const std::string& path) {
   std::string text;
   for (int line = 1; std::getline(file, text); ++line) {
     const bool line_ended = !file.eof();
-    const std::string_view content = Trimmed(text);
+    const bool is_marked = line == 1 && text.starts_with("\xEF\xBB\xBF");
+    const std::string_view content = Trimmed(std::string_view(text).substr(is_marked ? 3 : 0));
     if (content.empty() || content.front() == '#') {
       continue;
     }
-    CsvRow row{line,
-               content.find(',') == std::string_view::npos ? SplitAtBlanks(content)
-                                                           : SplitAtCommas(content),
+    const bool has_commas = content.find(',') != std::string_view::npos;
+    CsvRow row{line, has_commas ? SplitAtCommas(content) : SplitAtBlanks(content), has_commas,
                line_ended};
     double number = 0;
     const bool is_header = rows.empty() && line == 1 && !ParseNumber(row.fields.front(), &number);

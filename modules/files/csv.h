@@ -13,12 +13,13 @@ namespace pangea {
 struct CsvRow {
   int line = 0;                     // from 1
   std::vector<std::string> fields;  // trimmed
+  bool has_commas = false;          // between its fields; else blanks
   bool line_ended = true;           // false: the file ends without a newline after this row
 };
 
 // Splits each line at commas or, if it has none, at blanks. Skips empty lines, those that begin
-// with
-// '#', and a header: line 1, if its first field is not a number. Throws as OpenFile (text_file.h).
+// with '#', a header (line 1, if its first field is not a number), and the byte order mark that
+// editors write at the beginning. Throws as OpenFile (text_file.h).
 std::vector<CsvRow> ReadCsv(const std::string& path);
 
 // Converts a whole field. False if something is left over, on overflow, and for NaN or infinity.

@@ -144,12 +144,9 @@ Trajectory ReadEurocGroundTruth(const std::string& path, std::vector<std::string
 }
 
 Trajectory ReadTrajectory(const std::string& path, std::vector<std::string>* warnings) {
-  std::ifstream file = OpenFile(path);
-  std::string line;
-  while (std::getline(file, line) && (line.empty() || line.front() == '#')) {
-  }
-  return line.find(',') == std::string::npos ? ReadTum(path, warnings)
-                                             : ReadEurocGroundTruth(path, warnings);
+  const std::vector<CsvRow> rows = ReadCsv(path);
+  return rows.empty() || !rows.front().has_commas ? ReadTum(path, warnings)
+                                                  : ReadEurocGroundTruth(path, warnings);
 }
 
 void WriteTum(const std::string& path, const Trajectory& trajectory) {

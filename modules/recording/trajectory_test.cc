@@ -71,6 +71,21 @@ TEST_F(TrajectoryTest, ReadsBothGroundTruthWidths) {
   EXPECT_THAT(warnings_, IsEmpty());
 }
 
+// As editors and other programs save them.
+TEST_F(TrajectoryTest, TellsTheFormatsApartByTheirRows) {
+  const std::string tum = "2 1 2 3 0 0 0 1\n";
+  const std::string euroc = "2000000000,1,2,3,1,0,0,0\n";
+  for (const std::string& text :
+       {"\xEF\xBB\xBF" + tum, "\xEF\xBB\xBF" + euroc, "\r\n" + euroc, " # a\n" + euroc,
+        " # a, b\n" + tum, "stamp, x\n" + tum, "\xEF\xBB\xBF# a, b\n" + tum}) {
+    const Trajectory read = ReadTrajectory(Write(text), &warnings_);
+    ASSERT_EQ(read.size(), 1U) << text;
+    EXPECT_EQ(read[0].utime, 2'000'000) << text;
+    EXPECT_EQ(read[0].T.t, Eigen::Vector3d(1, 2, 3)) << text;
+  }
+  EXPECT_THAT(warnings_, IsEmpty());
+}
+
 TEST_F(TrajectoryTest, MendsRowsAndNamesThem) {
   std::string text = "# comment\n";
   for (int i = 0; i < 30; ++i) {
