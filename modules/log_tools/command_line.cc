@@ -50,6 +50,9 @@ void Export(Arguments& arguments) {
   if (arguments.tum.empty() && arguments.g2o.empty() && arguments.ply.empty()) {
     throw std::runtime_error("export: say what, one or more of --tum, --g2o, --ply");
   }
+  if (const std::string remark = RemarkOnExport(log, &arguments.readings); !remark.empty()) {
+    std::cerr << fmt::format("pangea-log: {}\n", remark);
+  }
   if (!arguments.tum.empty()) {
     for (const std::string& file : ExportTum(log, arguments.tum, &arguments.readings)) {
       std::cout << file << "\n";

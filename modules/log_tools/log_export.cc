@@ -11,6 +11,7 @@
 #include "messages/channels.h"
 #include "messages/encoding.h"
 #include "messages/messages.h"
+#include "report/metrics/report_groups.h"
 #include "report/metrics/report_metrics.h"
 #include "report/report_files.h"
 #include "report/report_pictures.h"
@@ -89,6 +90,11 @@ std::vector<std::string> ExportTum(const std::string& log, const std::string& fo
     }
   }
   return files;
+}
+
+std::string RemarkOnExport(const std::string& log, LogReadings* readings) {
+  return LacksStates(ReadServerLog(log, readings)) ? fmt::format("{}: {}", log, kLacksStates)
+                                                   : std::string();
 }
 
 void ExportPly(const std::string& log, const std::string& file, LogReadings* readings) {

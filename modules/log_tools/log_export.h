@@ -17,6 +17,8 @@ namespace pangea {
 // there are none.
 std::vector<std::string> ExportTum(const std::string& log, const std::string& folder,
                                    LogReadings* readings = nullptr);
+// Why the exports lack the fusions, if they do; else empty.
+std::string RemarkOnExport(const std::string& log, LogReadings* readings = nullptr);
 // Writes the map points of the largest group, coloured by agent.
 void ExportPly(const std::string& log, const std::string& file, LogReadings* readings = nullptr);
 

@@ -156,6 +156,15 @@ TEST_F(LogToolsTest, ARecordingIsOfAnAgentOfTheLog) {
                                  testing::HasSubstr("there are agents 1, 2"))));
 }
 
+// A journal has the constraints, but not the fusions that they led to.
+TEST_F(LogToolsTest, AnExportWithoutStatesIsRemarkedOn) {
+  EXPECT_EQ(RemarkOnExport(kSample), "");
+  CutLog(kSample, {.channels = "KEYFRAME_.*|CONSTRAINT"}, Path("journal.lcm"));
+  EXPECT_THAT(RemarkOnExport(Path("journal.lcm")), testing::HasSubstr("no MAP_STATE"));
+  CutLog(kSample, {.channels = "KEYFRAME_.*"}, Path("keyframes.lcm"));
+  EXPECT_EQ(RemarkOnExport(Path("keyframes.lcm")), "");
+}
+
 // An independent parser of the file gives the same cost as our own convention.
 TEST_F(LogToolsTest, TrajectoriesAndPoints) {
   EXPECT_EQ(ExportTum(kSample, Path("tum")).size(), 2U);

@@ -201,6 +201,10 @@ std::vector<std::string> ChangeLines(const CapturedSession& session, const Repor
   return lines;
 }
 
+std::string NoChangeLine(const CapturedSession& session) {
+  return LacksStates(session) ? "Fusions are unknown: see the notes." : "No maps were fused.";
+}
+
 std::string ConstraintsLine(const CapturedSession& session) {
   const ConstraintCounts counts = CountConstraints(session);
   const std::string derived =

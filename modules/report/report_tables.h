@@ -36,6 +36,8 @@ inline constexpr const char* kProcessesExplained =
 
 // One line for each fusion or split of a group.
 std::vector<std::string> ChangeLines(const CapturedSession& session, const ReportMetrics& metrics);
+// In place of those lines, if there is none.
+std::string NoChangeLine(const CapturedSession& session);
 // Numbers of accepted and refused constraints.
 std::string ConstraintsLine(const CapturedSession& session);
 

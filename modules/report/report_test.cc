@@ -18,6 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::StartsWith;
 
 using ReportTest = ReportWorld;
@@ -109,6 +110,18 @@ TEST_F(ReportTest, UnfusedMapsAreGroupsOfTheirOwnWithTheOdometrysPoses) {
   EXPECT_TRUE(Exists("map." + Underscored(Map(2)) + ".ply"));
   EXPECT_NEAR(report["agents"][0]["ate_server_m"].get<double>(),
               report["agents"][0]["ate_vio_m"].get<double>(), 0.01);
+}
+
+// A journal has the constraints, but not the fusions that they led to.
+TEST_F(ReportTest, WithoutStatesTheFusionsAreUnknown) {
+  LogKeyframes(Map(1), 0, NumKeyframes());
+  LogKeyframes(Map(2), 0, NumKeyframes());
+  LogConstraint(3, true, "");
+  const json report = Report();
+  EXPECT_THAT(report["notes"].dump(), HasSubstr("no MAP_STATE in this log"));
+  EXPECT_THAT(markdown_, HasSubstr("Fusions are unknown"));
+  EXPECT_THAT(markdown_, Not(HasSubstr("No maps were fused")));
+  EXPECT_THAT(Text("report.html"), Not(HasSubstr("No maps were fused")));
 }
 
 TEST_F(ReportTest, KeyframesBeyondTheSolveMoveWithItsLastPose) {

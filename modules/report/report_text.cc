@@ -31,8 +31,8 @@ std::string ReportMarkdown(const ReportInput& input, const CapturedSession& sess
       fmt::format("\n## Groups\n\n{}\nJoint ATE: one alignment for all agents of the group.\n\n",
                   GroupTable(metrics).Text());
   const std::vector<std::string> changes = ChangeLines(session, metrics);
-  text +=
-      changes.empty() ? "No maps were fused.\n" : fmt::format("- {}\n", fmt::join(changes, "\n- "));
+  text += changes.empty() ? NoChangeLine(session) + "\n"
+                          : fmt::format("- {}\n", fmt::join(changes, "\n- "));
   text += fmt::format("\n## Constraints\n\n{}\n", ConstraintsLine(session));
   if (const Table refused = RefusedTable(session); !refused.empty()) {
     text += fmt::format("\n{}", refused.Text());

@@ -161,7 +161,7 @@ std::string Fusions(const CapturedSession& session, const ReportMetrics& metrics
          ChartOr(FusionChart(session, metrics), "When maps became one",
                  "No keyframes were captured.") +
          Aside("A bar is a map; it takes the colour of the agent in whose map frame it is.") +
-         (changes.empty() ? Paragraph("No maps were fused.") : List(changes));
+         (changes.empty() ? Paragraph(NoChangeLine(session)) : List(changes));
 }
 
 std::string Constraints(const CapturedSession& session, const ReportMetrics& metrics) {

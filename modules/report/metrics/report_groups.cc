@@ -126,4 +126,10 @@ std::vector<FinalGroup> FinalGroups(const CapturedSession& session) {
   return groups;
 }
 
+bool LacksStates(const CapturedSession& session) {
+  return session.states.empty() &&
+         std::ranges::any_of(session.constraints,
+                             [](const auto& constraint) { return constraint.second.accepted; });
+}
+
 }  // namespace pangea

@@ -33,4 +33,11 @@ struct FinalGroup {
 // largest first.
 std::vector<FinalGroup> FinalGroups(const CapturedSession& session);
 
+// Whether the log has accepted constraints, but no state that they led to, as a journal:
+// FinalGroups then knows nothing of the fusions.
+bool LacksStates(const CapturedSession& session);
+inline constexpr const char* kLacksStates =
+    "no MAP_STATE in this log: each map stands alone, with its odometry's poses. The log of "
+    "pangea-session replay has the fused maps";
+
 }  // namespace pangea

@@ -257,6 +257,9 @@ ReportMetrics ComputeMetrics(const ReportInput& input, const CapturedSession& se
     metrics.notes.push_back(
         fmt::format("{} MAP_STATE lack a chunk in the log; ignored", session.incomplete_states));
   }
+  if (LacksStates(session)) {
+    metrics.notes.emplace_back(kLacksStates);
+  }
   for (const auto& [process, count] : input.restarts) {
     metrics.notes.push_back(fmt::format("{} died and was restarted{}", process,
                                         count == 1 ? "" : fmt::format(", {} times", count)));
