@@ -255,7 +255,7 @@ BackupSummary BackUp(const Site& site, const fs::path& to, bool with_keys) {
     throw std::runtime_error(
         fmt::format("{}: is no name for a folder; an archive is NAME{}", to.string(), kArchiveEnd));
   }
-  const WholePart journal = FindWholePart(site.journal());
+  const WholePart journal = FindWholePart(site);
   const std::vector<Source> sources = SourcesOf(site, with_keys, journal);
   BackupSummary summary{journal.bytes, journal.events,
                         journal.lost_bytes + LostBehind(journal, site), 0};
@@ -268,7 +268,7 @@ BackupSummary Restore(const fs::path& from, const fs::path& folder) {
   int64_t lost_bytes = 0;
   if (fs::is_directory(from)) {
     const Site site = ReadSite(from);
-    const WholePart journal = FindWholePart(site.journal());
+    const WholePart journal = FindWholePart(site);
     lost_bytes = LostBehind(journal, site);
     CopyToFolder(SourcesOf(site, true, journal), made.folder());
   } else {
@@ -280,7 +280,7 @@ BackupSummary Restore(const fs::path& from, const fs::path& folder) {
                        [&](Bytes part) { file->Write(part); }});
   }
   const Site restored = ReadSite(made.folder());
-  const WholePart journal = FindWholePart(restored.journal());
+  const WholePart journal = FindWholePart(restored);
   made.Commit(restored.description);
   return {journal.bytes, journal.events, journal.lost_bytes + lost_bytes, journal.bytes};
 }

@@ -88,8 +88,10 @@ TEST_P(BackupTest, BringsKeysIfWantedReadableByTheirOwnerAlone) {
   EXPECT_FALSE(fs::exists(folder / "again" / "gateway" / "invites")) << "a code is good once";
 }
 
-TEST_P(BackupTest, EndsBehindTheLastGroupThatIsWrittenToItsEnd) {
+// As the server that starts on the journal.
+TEST_P(BackupTest, HasAllWholeEventsOfAJournalWithATornEnd) {
   const std::vector<StoredEvent> events = EventsOf(site);
+  ASSERT_NE(events.size() % 10, 0U);  // a group has ten events
   // Cuts the last CHECKSUMS event
   fs::resize_file(site.journal(), fs::file_size(site.journal()) - 5);
   const auto bytes = static_cast<int64_t>(fs::file_size(site.journal()));
@@ -98,6 +100,18 @@ TEST_P(BackupTest, EndsBehindTheLastGroupThatIsWrittenToItsEnd) {
   EXPECT_EQ(summary.journal_bytes + summary.lost_bytes, bytes);
   EXPECT_EQ(Restore(copy, folder / "again").lost_bytes, 0);
   EXPECT_EQ(Restore(site.folder, folder / "restored").lost_bytes, summary.lost_bytes);
+  EXPECT_EQ(EventsOf(ReadSite(folder / "again")), events);
+  EXPECT_EQ(FoundAtOpening(ReadSite(folder / "again")), "");
+}
+
+TEST_P(BackupTest, EndsBehindTheLastGroupThatARunningServerHasWritten) {
+  const std::vector<StoredEvent> events = EventsOf(site);
+  fs::resize_file(site.journal(), fs::file_size(site.journal()) - 5);
+  {
+    const SiteLock lock(site);  // a server has it
+    EXPECT_EQ(BackUp(site, copy, false).lost_bytes, 0);
+  }
+  EXPECT_EQ(Restore(copy, folder / "again").lost_bytes, 0);
   const std::vector<StoredEvent> kept = EventsOf(ReadSite(folder / "again"));
   ASSERT_FALSE(kept.empty());
   EXPECT_EQ(kept.size(), events.size() / 10 * 10);  // a group has ten events

@@ -79,11 +79,13 @@ bool IsFileOfSite(const std::string& name) {
          is_in("gateway/", ".key") || is_in("gateway/", ".pem");
 }
 
-WholePart FindWholePart(const fs::path& journal) {
+WholePart FindWholePart(const Site& site) {
   constexpr int64_t kMegabyte = 1'000'000;
+  const fs::path journal = site.journal();
   if (!fs::exists(journal)) {
     return {};
   }
+  const bool is_written = UserOf(site).has_value();
   const OpenedFile file(journal);
   CheckedScan scan(file.fd());
   Progress progress("checking " + journal.string());
@@ -105,7 +107,7 @@ WholePart FindWholePart(const fs::path& journal) {
       checked = read;
     }
   }
-  return has_checksums ? checked : read;
+  return is_written && has_checksums ? checked : read;
 }
 
 }  // namespace pangea::site

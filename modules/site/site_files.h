@@ -26,13 +26,14 @@ std::vector<std::filesystem::path> GatewayIdentityFiles(const Site& site);
 bool IsFileOfSite(const std::string& name);
 
 struct WholePart {
-  int64_t bytes = 0;       // from the start to the end of the last complete group
+  int64_t bytes = 0;       // from the start to its end
   int64_t events = 0;      // complete events in it, including CHECKSUMS
   int64_t lost_bytes = 0;  // of damaged parts in it
 };
 
-// The complete part of a journal: up to its last CHECKSUMS or, if it has none, its last complete
-// event. Empty for a missing journal. Throws std::runtime_error if it cannot be read.
-WholePart FindWholePart(const std::filesystem::path& journal);
+// The complete part of a site's journal: up to its last complete event or, while a server writes
+// it, up to its last CHECKSUMS, if it has any. Empty for a missing journal. Throws
+// std::runtime_error if it cannot be read.
+WholePart FindWholePart(const Site& site);
 
 }  // namespace pangea::site
