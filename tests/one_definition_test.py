@@ -8,7 +8,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 NAMESPACE = re.compile(r"namespace ([\w:]+) \{")
-TYPE = re.compile(r"(?:class|struct|enum class|enum) (\w+)(?: final)?(?: :[^;]*)? \{")
+TYPE = re.compile(r"(?:(?:class|struct|enum class|enum) (\w+)(?: final)?(?: :[^;]*)? \{|using (\w+) =)")
 
 
 def definitions(text):
@@ -18,7 +18,7 @@ def definitions(text):
         if begin := NAMESPACE.match(line):
             namespace = begin[1]
         elif type_ := TYPE.match(line):
-            yield namespace, type_[1]
+            yield namespace, type_[1] or type_[2]
 
 
 class OneDefinition(unittest.TestCase):
@@ -33,8 +33,8 @@ class OneDefinition(unittest.TestCase):
         self.assertFalse({name: paths for name, paths in where.items() if len(paths) > 1})
 
     def test_finds_definitions(self):
-        text = "namespace a::b {\nclass C;\nclass D final : public E {\n  struct F {\n  };\n};\nenum class G { kH };\n"
-        self.assertEqual([("a::b", "D"), ("a::b", "G")], list(definitions(text)))
+        text = "namespace a::b {\nclass C;\nclass D final : public E {\n  struct F {\n  };\n};\nenum class G { kH };\nusing I = D;\n"
+        self.assertEqual([("a::b", "D"), ("a::b", "G"), ("a::b", "I")], list(definitions(text)))
 
 
 if __name__ == "__main__":

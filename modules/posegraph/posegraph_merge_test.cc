@@ -79,14 +79,14 @@ TEST(PoseGraph, RandomWrongMatchesNeverMerge) {
   }
 }
 
-std::vector<KeyframePair> PairsBetweenMaps(const SyntheticWorld& world) {
-  std::vector<KeyframePair> pairs = OverlappingPairs(world, 1.5, 25);
-  std::erase_if(pairs, [](const KeyframePair& pair) { return pair.from.map == pair.to.map; });
+std::vector<OverlappingPair> PairsBetweenMaps(const SyntheticWorld& world) {
+  std::vector<OverlappingPair> pairs = OverlappingPairs(world, 1.5, 25);
+  std::erase_if(pairs, [](const OverlappingPair& pair) { return pair.from.map == pair.to.map; });
   return pairs;
 }
 
 // A constraint consistent with a displacement `T` of map b: all such constraints agree.
-Constraint Shifted(const SyntheticWorld& world, const KeyframePair& pair, const Rigid3& T) {
+Constraint Shifted(const SyntheticWorld& world, const OverlappingPair& pair, const Rigid3& T) {
   Random random(StableHash(pair.from, pair.to, 1));
   Constraint constraint = MakeTrueConstraint(world, pair.from, pair.to, {}, random);
   constraint.T_from_to = world.T_hall_body(pair.from).Inverse() * T * world.T_hall_body(pair.to);
@@ -97,7 +97,7 @@ TEST(PoseGraph, AWrongMergeIsUndoneByMoreEvidence) {
   const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(2, 100));
   PoseGraph graph({});
   AddKeyframes(world, &graph);
-  const std::vector<KeyframePair> pairs = PairsBetweenMaps(world);
+  const std::vector<OverlappingPair> pairs = PairsBetweenMaps(world);
   const size_t stride = pairs.size() / 30;
   const Rigid3 wrong(YawRotation(0.4), {5, 3, 0});
   for (size_t i = 0; i < 6; ++i) {
@@ -122,7 +122,7 @@ TEST(PoseGraph, AWrongMergeIsUndoneByMoreEvidence) {
 
 TEST(PoseGraph, ADerivedConstraintMergesAloneUntilManyContradictIt) {
   const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(2, 100));
-  const std::vector<KeyframePair> pairs = PairsBetweenMaps(world);
+  const std::vector<OverlappingPair> pairs = PairsBetweenMaps(world);
   const size_t stride = pairs.size() / 30;
   Constraint derived = Shifted(world, pairs[0], Rigid3(YawRotation(0.4), {5, 3, 0}));
   derived.kind = PlaceKind::kDerived;
@@ -147,7 +147,7 @@ std::vector<uint8_t> Saved(PoseGraph* graph) {
 
 TEST(PoseGraph, ADerivedConstraintIsOneAfterARestartToo) {
   const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(2, 100));
-  const std::vector<KeyframePair> pairs = PairsBetweenMaps(world);
+  const std::vector<OverlappingPair> pairs = PairsBetweenMaps(world);
   Constraint derived = Shifted(world, pairs[0], {});
   derived.kind = PlaceKind::kDerived;
   PoseGraph graph({});
@@ -255,8 +255,8 @@ TEST(PoseGraph, GroupsThatAreOneAfterTheCheckpointKeepTheirShapes) {
 TEST(PoseGraph, AWrongMergeOfTheCheckpointIsUndoneByTheRestOfTheJournal) {
   const SyntheticWorld world = MakeSyntheticWorld(PosesOnly(3, 100));
   const MapId &first = world.agents[0].map, &second = world.agents[1].map;
-  std::vector<KeyframePair> wrong, later;
-  for (const KeyframePair& pair : PairsBetweenMaps(world)) {
+  std::vector<OverlappingPair> wrong, later;
+  for (const OverlappingPair& pair : PairsBetweenMaps(world)) {
     const auto [older, newer] = std::minmax(pair.from.map, pair.to.map);
     if (newer == second) {
       wrong.push_back(pair);

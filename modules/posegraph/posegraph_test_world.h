@@ -28,7 +28,7 @@ inline SyntheticWorldOptions PosesOnly(int num_agents, int num_keyframes, uint64
 inline std::vector<Constraint> MakeConstraints(const SyntheticWorld& world, int count,
                                                double false_share, uint64_t seed = 11) {
   Random random(seed);
-  const std::vector<KeyframePair> pairs = OverlappingPairs(world, 1.5, 25);
+  const std::vector<OverlappingPair> pairs = OverlappingPairs(world, 1.5, 25);
   std::vector<Constraint> constraints;
   const size_t stride = std::max<size_t>(1, pairs.size() / count);
   for (size_t i = 0; i < pairs.size(); i += stride) {

@@ -32,7 +32,7 @@ class ThinningTest : public ::testing::Test {
     options.start_apart = 0;
     world_ = MakeSyntheticWorld(options);
     std::mt19937_64 random(seed);
-    const std::vector<KeyframePair> pairs = OverlappingPairs(world_, 1.0, 25);
+    const std::vector<OverlappingPair> pairs = OverlappingPairs(world_, 1.0, 25);
     for (size_t i = 0; i < pairs.size(); i += 11) {
       constraints_.push_back(MakeTrueConstraint(world_, pairs[i].from, pairs[i].to, {}, random));
     }

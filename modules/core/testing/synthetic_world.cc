@@ -292,8 +292,8 @@ Constraint MakeFalseConstraint(const SyntheticWorld& world, const KeyframeId& fr
   return constraint;
 }
 
-std::vector<KeyframePair> OverlappingPairs(const SyntheticWorld& world, double distance_m,
-                                           int min_seq_gap) {
+std::vector<OverlappingPair> OverlappingPairs(const SyntheticWorld& world, double distance_m,
+                                              int min_seq_gap) {
   constexpr double kMinViewCosine = 0.8;
   std::vector<const Keyframe*> keyframes;
   for (const SyntheticAgent& agent : world.agents) {
@@ -301,7 +301,7 @@ std::vector<KeyframePair> OverlappingPairs(const SyntheticWorld& world, double d
       keyframes.push_back(&keyframe);
     }
   }
-  std::vector<KeyframePair> pairs;
+  std::vector<OverlappingPair> pairs;
   for (size_t i = 0; i < keyframes.size(); ++i) {
     const Rigid3& T_i = world.T_hall_body(keyframes[i]->id);
     for (size_t j = i + 1; j < keyframes.size(); ++j) {

@@ -93,12 +93,12 @@ Constraint MakeFalseConstraint(const SyntheticWorld& world, const KeyframeId& fr
 // Pairs of keyframes that look at the same part of the hall and are at most `distance_m` apart;
 // `from` is older than `to` in seq or map. Two keyframes of one map are at least `min_seq_gap`
 // apart.
-struct KeyframePair {
+struct OverlappingPair {
   KeyframeId from;
   KeyframeId to;
 };
-std::vector<KeyframePair> OverlappingPairs(const SyntheticWorld& world, double distance_m,
-                                           int min_seq_gap);
+std::vector<OverlappingPair> OverlappingPairs(const SyntheticWorld& world, double distance_m,
+                                              int min_seq_gap);
 
 // Makes the agent's odometry one with a wrong scale: one metre of it is exp(log_scale) true metres,
 // and its sigma of the scale is `sigma`.

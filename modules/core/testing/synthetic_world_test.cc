@@ -78,7 +78,7 @@ TEST(SyntheticWorld, TrueConstraintsAreAsNoisyAsTheyClaimAndFalseOnesAreNot) {
   SyntheticWorldOptions options;
   options.with_corners = false;
   const SyntheticWorld world = MakeSyntheticWorld(options);
-  const std::vector<KeyframePair> pairs = OverlappingPairs(world, 2.0, 20);
+  const std::vector<OverlappingPair> pairs = OverlappingPairs(world, 2.0, 20);
   ASSERT_GT(pairs.size(), 100u);
   std::mt19937_64 random(3);
   double sum = 0, least_false = 1e9;

@@ -47,7 +47,7 @@ struct Server {
       }
     }
     std::mt19937_64 rng(11);
-    const std::vector<KeyframePair> pairs = OverlappingPairs(world, 1.5, 25);
+    const std::vector<OverlappingPair> pairs = OverlappingPairs(world, 1.5, 25);
     for (size_t i = 0; i < pairs.size(); i += 1 + pairs.size() / 40) {
       Add(MakeTrueConstraint(world, pairs[i].from, pairs[i].to, {}, rng), &graph);
     }
