@@ -32,7 +32,19 @@ class Folder {
   fs::path path_;
 };
 
+// A function's static is there before the first target announces itself.
+std::map<std::string, TargetFunction>& MutableTargets() {
+  static std::map<std::string, TargetFunction> targets;
+  return targets;
+}
+
 }  // namespace
+
+Target::Target(const std::string& name, TargetFunction function) {
+  MutableTargets()[name] = function;
+}
+
+const std::map<std::string, TargetFunction>& Targets() { return MutableTargets(); }
 
 void Require(bool holds, const char* promise) {
   if (!holds) {
@@ -133,3 +145,9 @@ void WriteFile(const fs::path& file, Bytes bytes) {
 }
 
 }  // namespace pangea::fuzz
+
+// What libFuzzer calls: its programs have one target each.
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  static const auto target = pangea::fuzz::Targets().begin()->second;
+  return target(data, size);
+}

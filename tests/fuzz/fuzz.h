@@ -2,22 +2,28 @@
 
 // Common parts of the fuzz targets. A target is a function of bytes, in a file fuzz_<name>.cc. For
 // any bytes, it must not crash, hang, leak or let memory grow, and accepted input must fulfil the
-// checked promises (Require). Clang's libFuzzer drives it (scripts/fuzz); in every other build
-// replay_main.cc runs it on the corpus.
+// checked promises (Require). Clang's libFuzzer drives each in a program of its own (scripts/fuzz);
+// in every other build one program, replay_main.cc, runs any of them on its corpus.
 
 #include <cstdint>
 #include <deque>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "bus/bus.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size);
-
 namespace pangea::fuzz {
+
+// Announces a target of the program: each file defines one such constant.
+using TargetFunction = int (*)(const uint8_t* data, size_t size);
+struct Target {
+  Target(const std::string& name, TargetFunction function);
+};
+const std::map<std::string, TargetFunction>& Targets();
 
 // Aborts the process if the promise does not hold, so that the fuzzer reports it.
 void Require(bool holds, const char* promise);

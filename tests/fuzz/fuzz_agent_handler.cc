@@ -47,7 +47,7 @@ class Agent {
 }  // namespace
 }  // namespace pangea::fuzz
 
-int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+static int FuzzAgentHandler(const uint8_t* data, size_t size) {
   using namespace pangea;
   static const fuzz::Files files;
   static const SecretKey key = ReadKeyFileOf(files.key, 1);
@@ -64,3 +64,4 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   });
   return 0;
 }
+static const pangea::fuzz::Target kAgentHandler("agent_handler", FuzzAgentHandler);

@@ -73,7 +73,7 @@ class Apps {
 }  // namespace
 }  // namespace pangea::fuzz
 
-int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+static int FuzzAnchorApi(const uint8_t* data, size_t size) {
   using namespace pangea;
   const std::string text(data, data + size);
   const size_t line = std::min(text.find('\n'), text.size());
@@ -87,3 +87,4 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   apps.Ask({"GET", "/v1/anchors", "localhost", "", ""});
   return 0;
 }
+static const pangea::fuzz::Target kAnchorApi("anchor_api", FuzzAnchorApi);

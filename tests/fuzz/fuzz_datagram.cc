@@ -29,7 +29,7 @@ void Use(const UdpmAssembler::Message& message) {
 }  // namespace
 }  // namespace pangea::fuzz
 
-int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+static int FuzzDatagram(const uint8_t* data, size_t size) {
   using namespace pangea;
   UdpmAssembler assembler;
   size_t received = 0;
@@ -53,3 +53,4 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   }
   return 0;
 }
+static const pangea::fuzz::Target kDatagram("datagram", FuzzDatagram);

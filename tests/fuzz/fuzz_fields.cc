@@ -26,7 +26,7 @@ std::map<int64_t, bool (*)(Bytes)> DecodersOf() {
 }  // namespace
 }  // namespace pangea::fuzz
 
-int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+static int FuzzFields(const uint8_t* data, size_t size) {
   using namespace pangea;
   static const std::vector<LcmSchema> schemas = LcmSchemas();
   static const auto decoders =
@@ -51,3 +51,4 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   }
   return 0;
 }
+static const pangea::fuzz::Target kFields("fields", FuzzFields);

@@ -11,13 +11,13 @@
 namespace pangea::fuzz {
 namespace {
 
-constexpr int32_t kAgent = 7;
+constexpr int32_t kVisitor = 7;
 
 // Stores nothing, but checks the sizes that it was told.
 class CountingStore : public RecordingStore {
  public:
   std::string Begin(int32_t agent_id, int64_t bytes) override {
-    Require(agent_id == kAgent && bytes > 0 && bytes <= RecordingSocket::kMaxRecording,
+    Require(agent_id == kVisitor && bytes > 0 && bytes <= RecordingSocket::kMaxRecording,
             "an upload is an agent's, and bounded");
     left_ = bytes;
     return "";
@@ -43,14 +43,14 @@ class Strangers {
       : gateway_({"hall", "pangea", {}, ""},
                  {[](const JoinRequest& request) { return Join(request); },
                   [](int32_t agent_id, Bytes packet) {
-                    Require(agent_id == kAgent, "packets are of the agent that proved its key");
+                    Require(agent_id == kVisitor, "packets are of the agent that proved its key");
                     Require(!packet.empty(), "no packet is empty");
                   },
                   [](const std::string& why) { Require(!why.empty(), "a refusal has a reason"); },
                   [] {}},
                  store_) {
     gateway_.SetNow(1'000'000);
-    gateway_.SetAgents({{kAgent, {key_, "Anna"}}});
+    gateway_.SetAgents({{kVisitor, {key_, "Anna"}}});
   }
 
   void Ask(const web::WebRequest& request) {
@@ -95,11 +95,11 @@ class Strangers {
   // A peer that has proven its agent's key.
   std::unique_ptr<web::WebPeer> Proven(const std::string& path) {
     auto socket =
-        gateway_.Open({"GET", path + "?agent=" + std::to_string(kAgent), "localhost", "", ""});
+        gateway_.Open({"GET", path + "?agent=" + std::to_string(kVisitor), "localhost", "", ""});
     GatewayNonce nonce{};
     const std::vector<uint8_t> sent = socket->Next().value();
     std::copy(sent.begin(), sent.end(), nonce.begin());
-    const auto proof = GatewayProof(key_, kAgent, nonce);
+    const auto proof = GatewayProof(key_, kVisitor, nonce);
     Require(socket->Receive(std::string(proof.begin(), proof.end())), "a proof is taken");
     return socket;
   }
@@ -119,7 +119,7 @@ class Strangers {
 }  // namespace
 }  // namespace pangea::fuzz
 
-int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+static int FuzzGateway(const uint8_t* data, size_t size) {
   using namespace pangea;
   if (size == 0) {
     return 0;
@@ -140,3 +140,4 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   }
   return 0;
 }
+static const pangea::fuzz::Target kGateway("gateway", FuzzGateway);

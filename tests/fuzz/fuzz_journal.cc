@@ -48,7 +48,7 @@ int64_t NumFiles(const std::filesystem::path& folder) {
 }  // namespace
 }  // namespace pangea::fuzz
 
-int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+static int FuzzJournal(const uint8_t* data, size_t size) {
   using namespace pangea;
   std::cerr.rdbuf(nullptr);  // each damaged journal prints a warning
   const auto folder = fuzz::ScratchFolder() / "journal";
@@ -72,3 +72,4 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   }
   return 0;
 }
+static const pangea::fuzz::Target kJournal("journal", FuzzJournal);

@@ -5,7 +5,7 @@
 #include "messages/messages.h"
 #include "pangea/keyframe_2_t.hpp"
 
-int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+static int FuzzKeyframe(const uint8_t* data, size_t size) {
   using namespace pangea;
   std::vector<uint8_t> bytes(data, data + size);
   const bool second = size > 0 && data[size - 1] % 2 == 1;
@@ -23,3 +23,4 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   }
   return 0;
 }
+static const pangea::fuzz::Target kKeyframe("keyframe", FuzzKeyframe);

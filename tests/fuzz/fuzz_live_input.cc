@@ -5,7 +5,7 @@
 #include "sensor_channels.h"
 #include "vio/live/live_input.h"
 
-int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+static int FuzzLiveInput(const uint8_t* data, size_t size) {
   using namespace pangea;
   fuzz::QuickBus bus;
   vio::VioProcessOptions options;
@@ -20,3 +20,4 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   });
   return 0;
 }
+static const pangea::fuzz::Target kLiveInput("live_input", FuzzLiveInput);

@@ -99,7 +99,7 @@ void DecompressAndParse(std::vector<uint8_t> bytes) {
 }  // namespace
 }  // namespace pangea::fuzz
 
-int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+static int FuzzMessages(const uint8_t* data, size_t size) {
   using namespace pangea;
   using namespace pangea::fuzz;
   void (*const targets[])(std::vector<uint8_t>) = {
@@ -127,3 +127,4 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   }
   return 0;
 }
+static const pangea::fuzz::Target kMessages("messages", FuzzMessages);

@@ -46,7 +46,7 @@ void ReadKey(const std::string& text) {
 }  // namespace
 }  // namespace pangea::fuzz
 
-int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+static int FuzzOptions(const uint8_t* data, size_t size) {
   using namespace pangea;
   void (*const targets[])(const std::string&) = {
       fuzz::ReadSession,
@@ -66,3 +66,4 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   }
   return 0;
 }
+static const pangea::fuzz::Target kOptions("options", FuzzOptions);

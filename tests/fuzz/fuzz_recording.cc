@@ -42,7 +42,7 @@ void Read(const fs::path& mav0) {
 }  // namespace
 }  // namespace pangea::fuzz
 
-int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+static int FuzzRecording(const uint8_t* data, size_t size) {
   using namespace pangea;
   static const fuzz::fs::path mav0 = fuzz::MakeFolders();
   Bytes rest(data, size);
@@ -67,3 +67,4 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   try_to([&] { FirstImageUtimeOf(mav0.string()); });
   return 0;
 }
+static const pangea::fuzz::Target kRecording("recording", FuzzRecording);

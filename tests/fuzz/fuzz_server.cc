@@ -10,7 +10,7 @@
 #include "posegraph/posegraph_process.h"
 #include "server_channels.h"
 
-int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+static int FuzzServer(const uint8_t* data, size_t size) {
   using namespace pangea;
   fuzz::QuickBus bus;
   PlaceRecognitionProcess place_recognition(bus, PlaceRecognitionOptions{});
@@ -34,3 +34,4 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   bus.Drain();
   return 0;
 }
+static const pangea::fuzz::Target kServer("server", FuzzServer);

@@ -31,7 +31,7 @@ void Use(Spool* spool) {
 }  // namespace
 }  // namespace pangea::fuzz
 
-int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+static int FuzzSpool(const uint8_t* data, size_t size) {
   using namespace pangea;
   std::cerr.rdbuf(nullptr);  // each damaged segment prints a warning
   const auto folder = fuzz::ScratchFolder() / "spool";
@@ -56,3 +56,4 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   }
   return 0;
 }
+static const pangea::fuzz::Target kSpool("spool", FuzzSpool);

@@ -4,7 +4,7 @@
 #include "link_channels.h"
 #include "uplink/uplink_process.h"
 
-int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+static int FuzzUplink(const uint8_t* data, size_t size) {
   using namespace pangea;
   fuzz::QuickBus bus;
   UplinkProcess process(bus, bus, 1, fuzz::AgentKey(), UplinkOptions{});
@@ -35,3 +35,4 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   fuzz::Play({data, size}, fuzz::UplinkChannels(), &bus, poll);
   return 0;
 }
+static const pangea::fuzz::Target kUplink("uplink", FuzzUplink);

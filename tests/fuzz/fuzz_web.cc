@@ -92,8 +92,9 @@ class Server {
 }  // namespace
 }  // namespace pangea::fuzz
 
-int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+static int FuzzWeb(const uint8_t* data, size_t size) {
   static pangea::fuzz::Server server;
   server.Take({data, size});
   return 0;
 }
+static const pangea::fuzz::Target kWeb("web", FuzzWeb);

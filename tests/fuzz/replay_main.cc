@@ -1,7 +1,7 @@
-// Feeds every file of the named folders to a fuzz target, so that an error once found stays mended.
-// Then it feeds mutants of the files for a second: the bounded run of every build. The mutants are
-// the same in each run, up to the number that the time allows. libFuzzer, which is guided by
-// coverage, goes further (scripts/fuzz).
+// replay_main TARGET FOLDER: feeds every file of the folder to a fuzz target, so that an error once
+// found stays mended. Then it feeds mutants of the files for a second: the bounded run of every
+// build. The mutants are the same in each run, up to the number that the time allows. libFuzzer,
+// which is guided by coverage, goes further (scripts/fuzz).
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -13,6 +13,7 @@
 #include <fstream>
 #include <iterator>
 #include <random>
+#include <string>
 #include <vector>
 
 #include "fuzz.h"
@@ -26,12 +27,10 @@ using Clock = std::chrono::steady_clock;
 constexpr auto kMutantsFor = std::chrono::seconds(1);
 constexpr int kMaxMutants = 5000;
 
-std::vector<fs::path> FilesOf(int count, char** folders) {
+std::vector<fs::path> FilesOf(const fs::path& folder) {
   std::vector<fs::path> files;
-  for (int i = 0; i < count; ++i) {
-    for (const auto& entry : fs::directory_iterator(folders[i])) {
-      files.push_back(entry.path());
-    }
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    files.push_back(entry.path());
   }
   std::sort(files.begin(), files.end());
   return files;
@@ -87,18 +86,25 @@ void Keep(int file, const Input& input) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  const std::string name = argc == 3 ? argv[1] : "";
+  const auto found = pangea::fuzz::Targets().find(name);
+  if (found == pangea::fuzz::Targets().end()) {
+    std::fprintf(stderr, "usage: fuzz.replay TARGET FOLDER\n");
+    return 2;
+  }
+  const pangea::fuzz::TargetFunction target = found->second;
   std::vector<Input> corpus;
-  for (const fs::path& file : FilesOf(argc - 1, argv + 1)) {
+  for (const fs::path& file : FilesOf(argv[2])) {
     std::printf("%s\n", file.filename().c_str());  // the last file named caused a crash
     std::fflush(stdout);
     corpus.push_back(Read(file));
-    LLVMFuzzerTestOneInput(corpus.back().data(), corpus.back().size());
+    target(corpus.back().data(), corpus.back().size());
   }
   if (corpus.empty()) {
     return 1;
   }
   // The file stays if an input ends the process: that input belongs into the corpus.
-  const fs::path culprit = fs::path(argv[0]).filename().string() + ".culprit";
+  const fs::path culprit = "fuzz." + name + ".culprit";
   const int file = open(culprit.c_str(), O_CREAT | O_TRUNC | O_WRONLY | O_CLOEXEC, 0644);
   std::mt19937_64 rng(1);
   int mutants = 0;
@@ -106,7 +112,7 @@ int main(int argc, char** argv) {
        ++mutants) {
     const Input mutant = Mutant(corpus, rng);
     Keep(file, mutant);
-    LLVMFuzzerTestOneInput(mutant.data(), mutant.size());
+    target(mutant.data(), mutant.size());
   }
   close(file);
   fs::remove(culprit);
