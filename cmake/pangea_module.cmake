@@ -128,13 +128,25 @@ endfunction()
 set(test_files ${CMAKE_BINARY_DIR}/tmp)
 file(MAKE_DIRECTORY ${test_files})
 
-# pangea_test(name SOURCES ... DEPENDS ... [LABEL unit|system|slow] [TIMEOUT s] [COST s]) defines one GoogleTest
-# binary. The label is unit and the timeout 120 s if they are not given; what costs more starts earlier.
-function(pangea_test name)
-  if(EMSCRIPTEN)
-    return()
-  endif()
-  cmake_parse_arguments(ARG "" "LABEL;TIMEOUT;COST" "SOURCES;DEPENDS" ${ARGN})
+# pangea_test_program(name SOURCES ... DEPENDS ...) defines a program of GoogleTest's tests.
+function(pangea_test_program name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  # A test spends its time in the libraries; with -O1, its own code compiles a third faster. Most of
+  # that time is headers, so that one large unit takes half the time of two.
+  target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-O1>)
+  set_target_properties(${name} PROPERTIES UNITY_BUILD_BATCH_SIZE 25)
+  pangea_include_root(root)
+  target_include_directories(${name} PRIVATE ${root})
+  target_link_libraries(${name} PRIVATE ${ARG_DEPENDS} GTest::gtest GTest::gmock GTest::gtest_main)
+  target_compile_definitions(${name} PRIVATE PANGEA_SOURCE_DIR="${CMAKE_SOURCE_DIR}"
+    PANGEA_BINARY_DIR="${CMAKE_BINARY_DIR}")
+endfunction()
+
+# pangea_test_entry(name COMMAND ... [LABEL unit|system|slow] [TIMEOUT s] [COST s]) defines a test of
+# ctest. The label is unit and the timeout 120 s if they are not given; what costs more starts earlier.
+function(pangea_test_entry name)
+  cmake_parse_arguments(ARG "" "LABEL;TIMEOUT;COST" "COMMAND" ${ARGN})
   if(NOT ARG_LABEL)
     set(ARG_LABEL unit)
   endif()
@@ -144,18 +156,22 @@ function(pangea_test name)
   if(PANGEA_SANITIZE)  # tests are up to ten times slower
     math(EXPR ARG_TIMEOUT "10 * ${ARG_TIMEOUT}")
   endif()
-  add_executable(${name} ${ARG_SOURCES})
-  # A test spends its time in the libraries; with -O1, its own code compiles a third faster.
-  target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-O1>)
-  pangea_include_root(root)
-  target_include_directories(${name} PRIVATE ${root})
-  target_link_libraries(${name} PRIVATE ${ARG_DEPENDS} GTest::gtest GTest::gmock GTest::gtest_main)
-  target_compile_definitions(${name} PRIVATE PANGEA_SOURCE_DIR="${CMAKE_SOURCE_DIR}"
-    PANGEA_BINARY_DIR="${CMAKE_BINARY_DIR}")
-  add_test(NAME ${name} COMMAND ${name})
+  add_test(NAME ${name} COMMAND ${ARG_COMMAND})
   set_tests_properties(${name} PROPERTIES LABELS ${ARG_LABEL} TIMEOUT ${ARG_TIMEOUT}
     ENVIRONMENT TMPDIR=${test_files})
   if(ARG_COST)
     set_tests_properties(${name} PROPERTIES COST ${ARG_COST})
   endif()
+endfunction()
+
+# pangea_test(name SOURCES ... DEPENDS ... [LABEL ...] [TIMEOUT s] [COST s]) defines both, a program and
+# a test that runs it. A module has one or two: each more parses the same headers again.
+function(pangea_test name)
+  if(EMSCRIPTEN)
+    return()
+  endif()
+  cmake_parse_arguments(ARG "" "LABEL;TIMEOUT;COST" "SOURCES;DEPENDS" ${ARGN})
+  pangea_test_program(${name} SOURCES ${ARG_SOURCES} DEPENDS ${ARG_DEPENDS})
+  pangea_test_entry(${name} COMMAND ${name}
+    LABEL ${ARG_LABEL} TIMEOUT ${ARG_TIMEOUT} COST ${ARG_COST})
 endfunction()
