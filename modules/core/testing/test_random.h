@@ -7,6 +7,10 @@
 
 namespace pangea {
 
+inline double Uniform(std::mt19937_64& rng, double low, double high) {
+  return std::uniform_real_distribution<double>(low, high)(rng);
+}
+
 inline Eigen::Vector3d RandomVector(std::mt19937_64& rng, double sigma) {
   std::normal_distribution<double> normal(0, sigma);
   const double x = normal(rng), y = normal(rng), z = normal(rng);
