@@ -10,7 +10,7 @@
 namespace pangea {
 namespace {
 
-Matrix6d RandomCovariance(std::mt19937_64& rng) {
+Matrix6d SmallCovariance(std::mt19937_64& rng) {
   std::normal_distribution<double> normal(0, 0.01);
   Matrix6d A;
   for (double& value : A.reshaped()) {
@@ -28,8 +28,8 @@ TEST(ExtrinsicsCovariance, IsThatOfTheBodiesWhileTheCamerasStay) {
     c.id.map = {trial % 2 == 0 ? 2 : 1, 2};
     m.camera.T_body_cam = RandomPose(rng, 1, 1);
     c.camera.T_body_cam = RandomPose(rng, 1, 1);
-    m.T_body_cam_covariance = RandomCovariance(rng);
-    c.T_body_cam_covariance = RandomCovariance(rng);
+    m.T_body_cam_covariance = SmallCovariance(rng);
+    c.T_body_cam_covariance = SmallCovariance(rng);
     const Rigid3 T_m_c = RandomPose(rng, 1, 1);
     const Rigid3 T_cam_cam = m.camera.T_body_cam.Inverse() * T_m_c * c.camera.T_body_cam;
     const Eigen::MatrixXd J = NumericJacobian(12, 1e-6, [&](const Eigen::VectorXd& offset) {

@@ -11,15 +11,12 @@
 #include "core/matching.h"
 #include "core/testing/test_cameras.h"
 #include "core/testing/test_descriptors.h"
+#include "core/testing/test_random.h"
 
 namespace pangea {
 namespace {
 
 using Random = std::mt19937_64;
-
-double Uniform(Random& random, double low, double high) {
-  return std::uniform_real_distribution<double>(low, high)(random);
-}
 
 double Normal(Random& random, double sigma) {
   return std::normal_distribution<double>(0, sigma)(random);

@@ -5,14 +5,12 @@
 #include <Eigen/LU>
 #include <random>
 
+#include "core/testing/test_random.h"
+
 namespace pangea {
 namespace {
 
 using Random = std::mt19937_64;
-
-double Uniform(Random& random, double low, double high) {
-  return std::uniform_real_distribution<double>(low, high)(random);
-}
 
 Rigid3 RandomUpright(Random& random) {
   return {YawRotation(Uniform(random, -3, 3)),

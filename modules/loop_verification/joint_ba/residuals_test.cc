@@ -6,6 +6,7 @@
 
 #include "core/least_squares/edge_residual.h"
 #include "core/testing/numeric_jacobian.h"
+#include "core/testing/test_random.h"
 #include "loop_verification/correspondences/point_observation.h"
 #include "loop_verification/joint_ba/hosted_point.h"
 
@@ -14,16 +15,12 @@ namespace {
 
 using Random = std::mt19937_64;
 
-double Uniform(Random& random, double low, double high) {
-  return std::uniform_real_distribution<double>(low, high)(random);
-}
-
-Eigen::Vector3d RandomVector(Random& random, double size) {
+Eigen::Vector3d UniformVector(Random& random, double size) {
   return {Uniform(random, -size, size), Uniform(random, -size, size), Uniform(random, -size, size)};
 }
 
-Rigid3 RandomPose(Random& random, double angle, double distance) {
-  return {ExpSo3(RandomVector(random, angle)), RandomVector(random, distance)};
+Rigid3 UniformPose(Random& random, double angle, double distance) {
+  return {ExpSo3(UniformVector(random, angle)), UniformVector(random, distance)};
 }
 
 Matrix6d RandomCovariance(Random& random) {
@@ -37,8 +34,8 @@ Matrix6d RandomCovariance(Random& random) {
 TEST(EdgeResidual, JacobianWithACorrelatedCovariance) {
   Random random(3);
   for (int run = 0; run < 100; ++run) {
-    const Rigid3 T_from = RandomPose(random, 2, 5), T_from_to = RandomPose(random, 0.5, 1);
-    const Rigid3 T_to = T_from * T_from_to * RandomPose(random, 0.1, 0.1);
+    const Rigid3 T_from = UniformPose(random, 2, 5), T_from_to = UniformPose(random, 0.5, 1);
+    const Rigid3 T_to = T_from * T_from_to * UniformPose(random, 0.1, 0.1);
     const double kappa = Uniform(random, -0.3, 0.3);
     for (const auto scale : {EdgeResidual::Scale::kMap, EdgeResidual::Scale::kOdometry}) {
       const EdgeResidual edge(T_from_to, RandomCovariance(random), scale);
@@ -57,7 +54,7 @@ TEST(EdgeResidual, JacobianWithACorrelatedCovariance) {
 // The whitened residual squared is the Mahalanobis distance of the convention's error.
 TEST(EdgeResidual, IsWhitenedByItsCovariance) {
   Random random(4);
-  const Rigid3 T_from = RandomPose(random, 2, 5), T_from_to = RandomPose(random, 0.5, 1);
+  const Rigid3 T_from = UniformPose(random, 2, 5), T_from_to = UniformPose(random, 0.5, 1);
   const Matrix6d covariance = RandomCovariance(random);
   Vector6d xi;
   xi << 0.1, -0.2, 0.05, 0.01, 0.03, -0.02;
@@ -74,8 +71,8 @@ class HostedPointTest : public testing::Test {
 
   HostedPointTest() {
     for (int frame = 0; frame < 3; ++frame) {
-      T_w_body_.push_back(RandomPose(random_, 0.1, 0.3));
-      T_body_cam_.push_back(RandomPose(random_, 0.3, 0.1));
+      T_w_body_.push_back(UniformPose(random_, 0.1, 0.3));
+      T_body_cam_.push_back(UniformPose(random_, 0.3, 0.1));
     }
     Eigen::Matrix2d sqrt_info;
     sqrt_info << 40, 2, -1, 38;
@@ -195,15 +192,15 @@ TEST(PointObservation, JacobianOfBothDirections) {
   for (int run = 0; run < 100; ++run) {
     PointObservation observation;
     observation.direction = run % 2 == 0 ? Direction::kForward : Direction::kReverse;
-    observation.T_cam_w = RandomPose(random, 2, 1);
+    observation.T_cam_w = UniformPose(random, 2, 1);
     observation.ray = {0.1, 0.1};
     observation.sqrt_info << 400, 20, -10, 380;
-    const Rigid3 T_m_c = RandomPose(random, 2, 1);
+    const Rigid3 T_m_c = UniformPose(random, 2, 1);
     const Rigid3 T_observer_holder =
         observation.direction == Direction::kForward ? T_m_c.Inverse() : T_m_c;
     const Eigen::Vector3d p_cam(Uniform(random, -1, 1), Uniform(random, -1, 1), 4);
     observation.p_w = T_observer_holder.Inverse() * (observation.T_cam_w.Inverse() * p_cam);
-    observation.depth_sigma_w = RandomVector(random, 0.1);
+    observation.depth_sigma_w = UniformVector(random, 0.1);
     Eigen::Matrix<double, 2, 6> J;
     const auto at = Residual(observation, T_m_c, &J);
     ASSERT_TRUE(at);
