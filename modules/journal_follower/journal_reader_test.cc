@@ -26,7 +26,7 @@ using testing::ElementsAre;
 using testing::IsEmpty;
 using Which = JournalFollower::Which;
 
-const MapId kMap{1, 1000};
+const MapId kReadMap{1, 1000};
 
 // A journal file in a folder that only this test uses.
 class TestJournal {
@@ -49,7 +49,7 @@ class TestJournal {
   }
   void AddKeyframe(int32_t seq) {
     Keyframe keyframe;
-    keyframe.id = {kMap, seq};
+    keyframe.id = {kReadMap, seq};
     keyframe.camera.width = keyframe.camera.height = 100;
     keyframe.camera.fx = keyframe.camera.fy = 100;
     if (seq > 0) {
@@ -59,13 +59,13 @@ class TestJournal {
   }
   void AddMatch(int32_t seq) {
     PlaceMatch match;
-    match.query = {kMap, seq};
+    match.query = {kReadMap, seq};
     Add("PLACE_MATCH", ToMessage(match));
   }
   void AddResult(int32_t from_seq, int32_t to_seq) {
     Constraint result;
-    result.from = {kMap, from_seq};
-    result.to = {kMap, to_seq};
+    result.from = {kReadMap, from_seq};
+    result.to = {kReadMap, to_seq};
     result.reason = "too few inliers";
     Add("CONSTRAINT", ToMessage(result));
   }
@@ -108,9 +108,9 @@ class IdleBus : public LocalBus {
 };
 
 // A follower, the messages that it delivers ("k0 m0 r0"), and its requests.
-struct Follower {
-  explicit Follower(const JournalFollower::Follows& follows,
-                    const JournalCheckpoint& checkpoint = {})
+struct ReadingFollower {
+  explicit ReadingFollower(const JournalFollower::Follows& follows,
+                           const JournalCheckpoint& checkpoint = {})
       : node(bus, "test"),
         journal(node, follows,
                 {.keyframe = [this](const Keyframe& k) { Took("k", k.id.seq); },
@@ -143,7 +143,7 @@ struct Follower {
   void Have(int32_t highest_seq) {
     have_t have{};
     have.num_maps = 1;
-    have.maps = {ToMessage(kMap)};
+    have.maps = {ToMessage(kReadMap)};
     have.highest_seq = {highest_seq};
     PublishMessage(bus, "HAVE", have);
     bus.Drain();
@@ -170,7 +170,7 @@ constexpr JournalFollower::Follows kAll{
 TEST(JournalReader, AFollowerReadsTheFileAndAsksOnlyForWhatCameLater) {
   TestJournal journal;
   journal.AddKeyframes(3);
-  Follower follower(kAll);
+  ReadingFollower follower(kAll);
   follower.Tell(journal.file());
   EXPECT_TRUE(follower.journal.catching_up());
   follower.bus.DoAll();
@@ -188,9 +188,9 @@ TEST(JournalReader, AFollowerReadsTheFileAndAsksOnlyForWhatCameLater) {
 TEST(JournalReader, WhatAProcessSaidInFormerRunsComesFirst) {
   TestJournal journal;
   journal.AddKeyframes(2);
-  Follower matches({.in_order = true, .matches = Which::kOfFormerRuns});
-  Follower results({.matches = Which::kAll, .results = Which::kOfFormerRuns});
-  for (Follower* follower : {&matches, &results}) {
+  ReadingFollower matches({.in_order = true, .matches = Which::kOfFormerRuns});
+  ReadingFollower results({.matches = Which::kAll, .results = Which::kOfFormerRuns});
+  for (ReadingFollower* follower : {&matches, &results}) {
     follower->Tell(journal.file());
     follower->bus.DoAll();
   }
@@ -201,7 +201,7 @@ TEST(JournalReader, WhatAProcessSaidInFormerRunsComesFirst) {
 TEST(JournalReader, WhileTheFileIsReadNothingIsAskedFor) {
   TestJournal journal;
   journal.AddKeyframes(2000);
-  Follower follower(kAll);
+  ReadingFollower follower(kAll);
   follower.Tell(journal.file());
   ASSERT_TRUE(follower.bus.DoPiece()) << "one piece is not all of it";
   EXPECT_GT(follower.journal.num_to_catch_up(), 0);
@@ -211,13 +211,13 @@ TEST(JournalReader, WhileTheFileIsReadNothingIsAskedFor) {
   EXPECT_TRUE(follower.journal.catching_up());
   EXPECT_FALSE(CounterOf(follower.node.Status(0, 0, ""), "ready_utime"));
   follower.bus.DoAll();
-  EXPECT_EQ(follower.journal.next(kMap), 2000);
+  EXPECT_EQ(follower.journal.next(kReadMap), 2000);
 }
 
 TEST(JournalReader, AnErrorOfTheProcessIsNotTakenForOneOfTheFile) {
   TestJournal journal;
   journal.AddKeyframes(3);
-  Follower follower(kAll);
+  ReadingFollower follower(kAll);
   follower.Tell(journal.file());
   follower.fails = true;
   EXPECT_THROW(follower.bus.DoAll(), std::runtime_error);
@@ -226,22 +226,22 @@ TEST(JournalReader, AnErrorOfTheProcessIsNotTakenForOneOfTheFile) {
 TEST(JournalReader, TheStatesOfItsMapsAreAwaited) {
   TestJournal journal;
   journal.AddKeyframe(0);
-  Follower follower({.in_order = true, .states = true});
+  ReadingFollower follower({.in_order = true, .states = true});
   follower.Tell(journal.file());
   follower.bus.DoAll();
   EXPECT_TRUE(follower.journal.catching_up());
   follower.Tick(100'000);
   EXPECT_THAT(follower.requests, ElementsAre("MAP_STATE 0-0"));
-  follower.journal.NoteStates({kMap});
+  follower.journal.NoteStates({kReadMap});
   EXPECT_FALSE(follower.journal.catching_up());
 }
 
 TEST(JournalReader, AStateThatComesWhileTheFileIsReadIsNotAskedFor) {
   TestJournal journal;
   journal.AddKeyframe(0);
-  Follower follower({.in_order = true, .states = true});
+  ReadingFollower follower({.in_order = true, .states = true});
   follower.Tell(journal.file());
-  follower.journal.NoteStates({kMap});
+  follower.journal.NoteStates({kReadMap});
   follower.bus.DoAll();
   EXPECT_FALSE(follower.journal.catching_up());
 }
@@ -252,7 +252,7 @@ TEST(JournalReader, WhatWasNotYetSaidToBeThereIsNotTaken) {
   const JournalFile file = journal.file();
   journal.AddKeyframe(1);
   std::ofstream(journal.path(), std::ios::app) << "half an event";
-  Follower follower(kAll);
+  ReadingFollower follower(kAll);
   follower.Tell(file);
   follower.bus.DoAll();
   EXPECT_EQ(follower.taken, "k0 ");
@@ -272,7 +272,7 @@ TEST(JournalReader, EditsOfAnchorsComeTooAndDamageCostsWhatItHit) {
   std::fstream(journal.path(), std::ios::binary | std::ios::in | std::ios::out)
       .seekp(second)
       .write("damage", 6);
-  Follower follower({});
+  ReadingFollower follower({});
   follower.Tell(journal.file());
   follower.bus.DoAll();
   EXPECT_EQ(follower.taken, "e0 k1 ");
@@ -287,7 +287,7 @@ TEST(JournalReader, AFileThatIsNotTheJournalIsLeftAndTheBusAsked) {
   files[2].state.num_bytes += 1000;
   ++files[3].state.last_event_crc32;
   for (const JournalFile& file : files) {
-    Follower follower(kAll);
+    ReadingFollower follower(kAll);
     follower.Tell(file);
     EXPECT_FALSE(follower.journal.reading()) << file.path;
     follower.Have(1);
@@ -303,15 +303,16 @@ class JournalCheckpoints : public testing::Test {
  protected:
   std::string Write() { return Taken(true); }
   std::string Taken(bool writes = false) {
-    Follower follower(follows_, {.place = {journal_.path() + ".checkpoint", options_, writes},
-                                 .save = [](ByteWriter* writer) { writer->Put(7); },
-                                 .restore =
-                                     [this](ByteReader* reader) {
-                                       int seven = 0;
-                                       reader->Get(&seven);
-                                       return seven == 7 && reader->at_end() && !refuses_;
-                                     },
-                                 .keyframe_is_complete = is_complete_});
+    ReadingFollower follower(follows_,
+                             {.place = {journal_.path() + ".checkpoint", options_, writes},
+                              .save = [](ByteWriter* writer) { writer->Put(7); },
+                              .restore =
+                                  [this](ByteReader* reader) {
+                                    int seven = 0;
+                                    reader->Get(&seven);
+                                    return seven == 7 && reader->at_end() && !refuses_;
+                                  },
+                              .keyframe_is_complete = is_complete_});
     follower.Tell(journal_.file());
     follower.bus.DoAll();
     return follower.taken;
