@@ -14,8 +14,8 @@ namespace {
 
 constexpr int64_t kTick = 100'000;
 
-struct Server {
-  Server() : process(bus, GlobalBaOptions{}) {
+struct ServerOnBus {
+  ServerOnBus() : process(bus, GlobalBaOptions{}) {
     bus.Subscribe("REFINEMENT", [this](const std::string&, Bytes data) {
       DecodeMessage(data, &refinements.emplace_back());
     });
@@ -63,7 +63,7 @@ BaTestMessages SmallWorld() { return MessagesOf(MakeBaTestWorld({.keyframes = 8}
 
 TEST(GlobalBaProcess, RefinesWhenItIsQuietAndOnlyOnce) {
   const BaTestMessages messages = SmallWorld();
-  Server server;
+  ServerOnBus server;
   server.SendAll(messages);
   server.Tick(25);
   EXPECT_EQ(server.status.pending, 1);
@@ -79,7 +79,7 @@ TEST(GlobalBaProcess, RefinesWhenItIsQuietAndOnlyOnce) {
 
 TEST(GlobalBaProcess, WhoAsksForAStateGetsTheRefinementToo) {
   const BaTestMessages messages = SmallWorld();
-  Server server;
+  ServerOnBus server;
   server.SendAll(messages);
   const auto ask = [&](const MapId& map) {
     resend_request_t request{};
@@ -103,7 +103,7 @@ TEST(GlobalBaProcess, WhoAsksForAStateGetsTheRefinementToo) {
 
 TEST(GlobalBaProcess, AMessagePutsItOff) {
   const BaTestMessages messages = SmallWorld();
-  Server server;
+  ServerOnBus server;
   server.SendAll(messages);
   Keyframe next = messages.keyframes.back();
   for (int i = 0; i < 5; ++i) {
@@ -128,7 +128,7 @@ TEST(GlobalBaProcess, AMessagePutsItOff) {
 
 TEST(GlobalBaProcess, LiveAndReplayGiveTheSameBytes) {
   const BaTestMessages messages = SmallWorld();
-  Server live, replay;
+  ServerOnBus live, replay;
   live.SendAll(messages);
   live.Tick(90);
   replay.SendAll(messages);
@@ -146,7 +146,7 @@ TEST(GlobalBaProcess, AsksForWhatItLacks) {
   BaTestMessages messages = SmallWorld();
   const Keyframe lost = messages.keyframes[3];
   messages.keyframes.erase(messages.keyframes.begin() + 3);
-  Server server;
+  ServerOnBus server;
   server.SendAll(messages);
   have_t have{};
   have.num_maps = 1;
@@ -175,7 +175,7 @@ TEST(GlobalBaProcess, AsksForWhatItLacks) {
 }
 
 TEST(GlobalBaProcess, RefusesWhatIsNotValid) {
-  Server server;
+  ServerOnBus server;
   PublishMessage(server.bus, "MAP_STATE", map_state_t{});
   PublishMessage(server.bus, "CONSTRAINT", constraint_t{});
   server.bus.Publish("KEYFRAME_1", std::vector<uint8_t>{1, 2, 3});

@@ -10,8 +10,8 @@
 namespace pangea {
 namespace {
 
-struct Server {
-  explicit Server(const BaTestMessages& messages, std::shared_ptr<RecordStore> records = nullptr)
+struct Adjuster {
+  explicit Adjuster(const BaTestMessages& messages, std::shared_ptr<RecordStore> records = nullptr)
       : ba(GlobalBaOptions{}, std::move(records)) {
     for (const Keyframe& keyframe : messages.keyframes) {
       ba.Take(keyframe);
@@ -47,7 +47,7 @@ BaWorld Moved(BaWorld world, const MapState& refined) {
 
 TEST(GlobalBa, RefinesAGroup) {
   const BaTestWorld world = MakeBaTestWorld({});
-  const auto refined = Server(MessagesOf(world)).Finish();
+  const auto refined = Adjuster(MessagesOf(world)).Finish();
   ASSERT_TRUE(refined.has_value());
   EXPECT_EQ(refined->revision, 1);
   const double before = WorstError(world.start, world.truth);
@@ -62,7 +62,7 @@ TEST(GlobalBa, WithoutInertialMeasurementsTheEdgesGiveTheScale) {
         MakeBaTestWorld({.seed = seed, .keyframes = 40, .edge_sigma_m = 0.002, .imu = false});
     const double true_length = PathLength(world.truth);
     ASSERT_NEAR(PathLength(world.start) / true_length, 1.02, 5e-3);
-    const auto refined = Server(MessagesOf(world)).Finish();
+    const auto refined = Adjuster(MessagesOf(world)).Finish();
     ASSERT_TRUE(refined.has_value());
     const BaWorld moved = Moved(world.start, *refined);
     EXPECT_NEAR(PathLength(moved) / true_length, 1, 2e-3);
@@ -84,7 +84,7 @@ TEST(GlobalBa, AnOdometryThatCallsItselfExactDoesNoHarm) {
         keyframe.edge->covariance = variance * Matrix6d::Identity();
       }
     }
-    const auto refined = Server(messages).Finish();
+    const auto refined = Adjuster(messages).Finish();
     ASSERT_TRUE(refined);
     EXPECT_LT(WorstError(Moved(world.start, *refined), world.truth),
               0.2 * WorstError(world.start, world.truth))
@@ -98,7 +98,7 @@ TEST(GlobalBa, AKeyframeWithoutLandmarksMovesWithItsEdges) {
   std::erase_if(world.start.observations, [&](const BaObservation& seen) {
     return world.start.keyframes[seen.keyframe].id == KeyframeId{{2, 1000}, 10};
   });
-  const auto refined = Server(MessagesOf(world)).Finish();
+  const auto refined = Adjuster(MessagesOf(world)).Finish();
   ASSERT_TRUE(refined.has_value());
   EXPECT_LT(WorstError(Moved(world.start, *refined), world.truth),
             0.2 * WorstError(world.start, world.truth));
@@ -109,10 +109,10 @@ TEST(GlobalBa, WhereItBeginsDoesNotMatter) {
   for (const uint64_t seed : {1, 2, 3}) {
     const BaTestWorld world = MakeBaTestWorld({.seed = seed});
     BaTestMessages messages = MessagesOf(world);
-    const auto from_odometry = Server(messages).Finish();
+    const auto from_odometry = Adjuster(messages).Finish();
     ASSERT_TRUE(from_odometry);
     messages.state.keyframes = from_odometry->keyframes;
-    const auto from_adjusted = Server(messages).Finish();
+    const auto from_adjusted = Adjuster(messages).Finish();
     ASSERT_TRUE(from_adjusted);
     EXPECT_LT(WorstError(Moved(world.start, *from_odometry), Moved(world.start, *from_adjusted)),
               1e-4);
@@ -121,12 +121,12 @@ TEST(GlobalBa, WhereItBeginsDoesNotMatter) {
 
 TEST(GlobalBa, TheOrderOfMessagesDoesNotMatter) {
   BaTestMessages messages = MessagesOf(MakeBaTestWorld({.keyframes = 8}));
-  const auto in_order = Server(messages).Finish();
+  const auto in_order = Adjuster(messages).Finish();
   std::mt19937_64 rng(1);
   std::ranges::shuffle(messages.keyframes, rng);
   std::ranges::shuffle(messages.matches, rng);
   std::ranges::shuffle(messages.constraints, rng);
-  const auto shuffled = Server(messages).Finish();
+  const auto shuffled = Adjuster(messages).Finish();
   ASSERT_TRUE(in_order && shuffled);
   for (size_t i = 0; i < in_order->keyframes.size(); ++i) {
     EXPECT_EQ(in_order->keyframes[i].T_map_body.t, shuffled->keyframes[i].T_map_body.t);
@@ -157,9 +157,9 @@ class CountingStore : public RecordStore {
 TEST(GlobalBa, NothingIsReadOfOtherGroups) {
   const BaTestMessages group = MessagesOf(MakeBaTestWorld({.keyframes = 8}));
   const auto alone = std::make_shared<CountingStore>();
-  ASSERT_TRUE(Server(group, alone).Finish());
+  ASSERT_TRUE(Adjuster(group, alone).Finish());
   const auto beside_another = std::make_shared<CountingStore>();
-  Server server(group, beside_another);
+  Adjuster server(group, beside_another);
   constexpr int32_t kOthers = 100;
   for (PlaceMatch match : group.matches) {
     match.query.map.agent_id += kOthers;
@@ -180,13 +180,13 @@ TEST(GlobalBa, NothingIsReadOfOtherGroups) {
 // A redundant candidate, which was not verified, still adds observations; a refused one does not.
 TEST(GlobalBa, RedundantMatchesTieLandmarks) {
   BaTestMessages messages = MessagesOf(MakeBaTestWorld({.keyframes = 8}));
-  const auto accepted = Server(messages).Finish();
+  const auto accepted = Adjuster(messages).Finish();
   const auto with_reason = [&](const std::string& reason) {
     for (Constraint& constraint : messages.constraints) {
       constraint.accepted = false;
       constraint.reason = reason;
     }
-    return Server(messages).Finish();
+    return Adjuster(messages).Finish();
   };
   const auto redundant = with_reason(kRedundant);
   const auto refused = with_reason("too few inliers");
@@ -198,7 +198,7 @@ TEST(GlobalBa, RedundantMatchesTieLandmarks) {
 
 TEST(GlobalBa, AMessageOfTheGroupDropsTheWorkAndOtherMessagesDoNot) {
   const BaTestMessages messages = MessagesOf(MakeBaTestWorld({.keyframes = 8}));
-  Server server(messages);
+  Adjuster server(messages);
   server.ba.Advance();
   server.ba.Advance();
   Keyframe elsewhere = messages.keyframes.front();
@@ -217,7 +217,7 @@ TEST(GlobalBa, AMessageOfTheGroupDropsTheWorkAndOtherMessagesDoNot) {
 
 TEST(GlobalBa, AGroupIsDueAgainWhenItsLoopsOrKeyframesChange) {
   const BaTestMessages messages = MessagesOf(MakeBaTestWorld({.keyframes = 8}));
-  Server server(messages);
+  Adjuster server(messages);
   const auto refined = server.Finish();
   ASSERT_TRUE(refined.has_value());
   MapState state = *refined;
@@ -235,7 +235,7 @@ TEST(GlobalBa, AGroupIsDueAgainWhenItsLoopsOrKeyframesChange) {
 
 TEST(GlobalBa, AGroupIsDueAgainWhenThePoseGraphHasForgotten) {
   const BaTestMessages messages = MessagesOf(MakeBaTestWorld({.keyframes = 8}));
-  Server server(messages);
+  Adjuster server(messages);
   ASSERT_TRUE(server.Finish().has_value());
   MapState state = messages.state;
   ++state.revision;
@@ -245,7 +245,7 @@ TEST(GlobalBa, AGroupIsDueAgainWhenThePoseGraphHasForgotten) {
 
 TEST(GlobalBa, AStateThatComesLateChangesNothing) {
   const BaTestMessages messages = MessagesOf(MakeBaTestWorld({.keyframes = 8}));
-  Server server(messages);
+  Adjuster server(messages);
   MapState refined = *server.Finish();
   refined.revision = 3;
   server.ba.Take(refined);
@@ -258,13 +258,13 @@ TEST(GlobalBa, AStateThatComesLateChangesNothing) {
 TEST(GlobalBa, AMapWithoutLoopsIsNotDue) {
   BaTestMessages messages = MessagesOf(MakeBaTestWorld({.agents = 1}));
   EXPECT_EQ(messages.state.num_constraints, 0);
-  EXPECT_FALSE(Server(messages).ba.HasWork());
+  EXPECT_FALSE(Adjuster(messages).ba.HasWork());
 }
 
 // The maps have been separated since: the state of both is outdated.
 TEST(GlobalBa, AGroupThatIsNoMoreIsNotDue) {
   const BaTestMessages messages = MessagesOf(MakeBaTestWorld({.keyframes = 8}));
-  Server server(messages);
+  Adjuster server(messages);
   for (const MapId& map : messages.state.maps) {
     MapState alone = messages.state;
     alone.group = map;

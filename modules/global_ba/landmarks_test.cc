@@ -18,12 +18,12 @@
 namespace pangea {
 namespace {
 
-constexpr int kKeyframes = 6;
+constexpr int kKeyframesPerAgent = 6;
 
 // Two agents with exact rays and poses.
 struct Group {
   Group()
-      : truth(MakeBaTestWorld({.keyframes = kKeyframes,
+      : truth(MakeBaTestWorld({.keyframes = kKeyframesPerAgent,
                                .step_s = 0.51,  // so far apart that none is redundant
                                .landmarks = 40,
                                .noise = 0,
@@ -53,7 +53,7 @@ struct Group {
 int CountShared(const BaWorld& world) {
   std::map<int, std::array<bool, 2>> seen_by;
   for (const BaObservation& seen : world.observations) {
-    seen_by[seen.landmark][seen.keyframe / kKeyframes] = true;
+    seen_by[seen.landmark][seen.keyframe / kKeyframesPerAgent] = true;
   }
   int shared = 0;
   for (const auto& [landmark, agents] : seen_by) {
@@ -114,14 +114,14 @@ TEST(Landmarks, AMatchCountsAsItsCornersAreFound) {
   int matched = 0;
   double track = 0;
   for (const BaObservation& seen : world.observations) {
-    const bool own = seen.keyframe < kKeyframes;
+    const bool own = seen.keyframe < kKeyframesPerAgent;
     track = own ? std::max(track, seen.sqrt_info.norm()) : track;
     matched += own ? 0 : 1;
   }
   ASSERT_GT(matched, 0);
   const double ratio = kTrackSigma_px / (kMatchSigma_px * 1.44);
   for (const BaObservation& seen : world.observations) {
-    if (seen.keyframe >= kKeyframes) {
+    if (seen.keyframe >= kKeyframesPerAgent) {
       EXPECT_NEAR(seen.sqrt_info.norm() / (track * ratio), 1,
                   0.35);  // the lens varies over the image
     }
@@ -136,15 +136,15 @@ TEST(Landmarks, AMatchOfTwoTracksCountsOnce) {
   std::map<std::pair<int, double>, double> own;
   int matched = 0;
   for (const BaObservation& seen : world.observations) {
-    if (owner.try_emplace(seen.landmark, seen.keyframe / kKeyframes).first->second ==
-        seen.keyframe / kKeyframes) {
+    if (owner.try_emplace(seen.landmark, seen.keyframe / kKeyframesPerAgent).first->second ==
+        seen.keyframe / kKeyframesPerAgent) {
       own[{seen.keyframe, seen.ray.x()}] = seen.sqrt_info.norm();
     }
   }
   const double ratio = std::sqrt(0.5) * kTrackSigma_px / kMatchSigma_px;
   for (const BaObservation& seen : world.observations) {
     const auto same_corner = own.find({seen.keyframe, seen.ray.x()});
-    if (owner.at(seen.landmark) != seen.keyframe / kKeyframes && same_corner != own.end()) {
+    if (owner.at(seen.landmark) != seen.keyframe / kKeyframesPerAgent && same_corner != own.end()) {
       EXPECT_NEAR(seen.sqrt_info.norm() / same_corner->second, ratio, 1e-6);
       ++matched;
     }
@@ -164,7 +164,7 @@ TEST(Landmarks, ACornerSeesATrackOnceHoweverManyKeyframesItIsMatchedWith) {
     other.match = keyframes[neighbour].id;
     other.corners.clear();
     for (const auto& [corner, unused] : pair.corners) {
-      const int32_t id = keyframes[kKeyframes + pair.query.seq].corners[corner].landmark_id;
+      const int32_t id = keyframes[kKeyframesPerAgent + pair.query.seq].corners[corner].landmark_id;
       const auto& there = keyframes[neighbour].corners;
       const auto same = std::ranges::find(there, id, &Corner::landmark_id);
       if (same != there.end()) {
@@ -228,12 +228,12 @@ TEST(GroupWorld, IsTheGraphsPosesWithTheOdometrysMotion) {
     pose.T_map_body = rotated * pose.T_map_body;
   }
   const BaWorld world = group.World();
-  ASSERT_EQ(world.keyframes.size(), 2u * kKeyframes);
+  ASSERT_EQ(world.keyframes.size(), 2u * kKeyframesPerAgent);
   for (size_t i = 0; i < world.keyframes.size(); ++i) {
     const KeyframeState& got = world.keyframes[i].state;
     const KeyframeState& odometry = group.truth.start.keyframes[i].state;
     EXPECT_LT((got.v_map_body - rotated.q * odometry.v_map_body).norm(), 1e-9);
-    EXPECT_EQ(world.keyframes[i].preintegration.has_value(), i % kKeyframes != 0);
+    EXPECT_EQ(world.keyframes[i].preintegration.has_value(), i % kKeyframesPerAgent != 0);
   }
 }
 
@@ -247,8 +247,8 @@ TEST(GroupWorld, EachMapHasItsLastCamera) {
   ASSERT_EQ(world.cameras.size(), 2u);
   for (int agent = 0; agent < 2; ++agent) {
     EXPECT_DOUBLE_EQ(world.cameras[agent].T_body_cam.t.x(),
-                     0.1 * (agent + 1) + 1e-6 * (kKeyframes - 1));
-    EXPECT_EQ(world.keyframes[agent * kKeyframes].camera, agent);
+                     0.1 * (agent + 1) + 1e-6 * (kKeyframesPerAgent - 1));
+    EXPECT_EQ(world.keyframes[agent * kKeyframesPerAgent].camera, agent);
   }
 }
 
@@ -267,7 +267,7 @@ TEST(GroupWorld, AMissingKeyframeBreaksTheChain) {
   Group group;
   group.messages.keyframes.erase(group.messages.keyframes.begin() + 2);
   const BaWorld world = group.World();
-  ASSERT_EQ(world.keyframes.size(), 2u * kKeyframes - 1);
+  ASSERT_EQ(world.keyframes.size(), 2u * kKeyframesPerAgent - 1);
   EXPECT_EQ(world.keyframes[2].previous, -1);
   EXPECT_EQ(world.keyframes[3].previous, 2);
 }
