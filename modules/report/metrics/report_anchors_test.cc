@@ -9,6 +9,8 @@
 #include <cmath>
 #include <functional>
 
+#include "report/report_test_world.h"
+
 namespace pangea {
 namespace {
 
@@ -21,17 +23,16 @@ constexpr double kPlaced_s = 5.01;  // between two frames
 constexpr double kFused_s = 10;
 constexpr double kShown_s = 11;
 const MapId kMaps[] = {{0, 0}, {1, 100}, {2, 200}, {3, 300}};
-const AnchorId kKettle{1, kWall + 5};
-const Eigen::Vector3d kPlace{2, 0.3, 5};  // in the ground truth's frame
+const AnchorId kSeenKettle{1, kWall + 5};
+const Eigen::Vector3d kSeenPlace{2, 0.3, 5};  // in the ground truth's frame
 
 int64_t Sensor(double s) { return kSensor + std::llround(1e6 * s); }
 int64_t Wall(double s) { return kWall + std::llround(1e6 * s); }
 
 // The cameras look along z, from either side of the place.
-Rigid3 Truth(int32_t agent, double s) {
+Rigid3 Walk(int32_t agent, double s) {
   return {YawRotation(0.02 * s * agent), {0.1 * s, 0.2 * agent, 0.02 * std::sin(s)}};
 }
-Rigid3 OdomFromTruth(int32_t agent) { return {YawRotation(0.7 * agent), {4.0 * agent, -3, 1}}; }
 
 using Offset = std::function<Eigen::Vector3d(double s)>;
 Eigen::Vector3d None(double) { return Eigen::Vector3d::Zero(); }
@@ -54,12 +55,11 @@ struct World {
       tracks[agent];
       session.cameras[agent] = camera;
       for (int i = 0; i <= 4000; ++i) {
-        ground_truth[agent].push_back({Sensor(0.01 * i), Truth(agent, 0.01 * i)});
+        ground_truth[agent].push_back({Sensor(0.01 * i), Walk(agent, 0.01 * i)});
       }
       for (int i = 0; i <= 800; ++i) {
         const double s = 0.05 * i;
-        odometry[agent][kMaps[agent]].push_back(
-            {Sensor(s), OdomFromTruth(agent) * Truth(agent, s)});
+        odometry[agent][kMaps[agent]].push_back({Sensor(s), OdomFromTruth(agent) * Walk(agent, s)});
       }
     }
     Change(kFused_s, {1, 2});
@@ -76,14 +76,14 @@ struct World {
 
   void Place(int64_t revision, double s, const Eigen::Vector3d& p_truth) {
     AnchorEdit edit;
-    edit.anchor = kKettle;
+    edit.anchor = kSeenKettle;
     edit.agent_id = 1;
     edit.revision = revision;
     edit.name = "kettle";
     edit.placement = AnchorEdit::Placement::kPixel;
     edit.map = kMaps[1];
     edit.utime = Sensor(s);
-    session.anchor_edits[kKettle].push_back(edit);
+    session.anchor_edits[kSeenKettle].push_back(edit);
     Hear(1, revision, s + 1, p_truth);
   }
 
@@ -91,21 +91,22 @@ struct World {
   void Hear(int32_t agent, int64_t revision, double s, const Eigen::Vector3d& p_truth) {
     Rigid3 T_odom_anchor;
     T_odom_anchor.t = OdomFromTruth(agent) * p_truth;
-    tracks[agent].heard[kKettle].push_back({Wall(s), revision, false, kMaps[agent], T_odom_anchor});
+    tracks[agent].heard[kSeenKettle].push_back(
+        {Wall(s), revision, false, kMaps[agent], T_odom_anchor});
   }
 
   // Adds SHOWN_ANCHORS_k, a new one for each frame; `offset` is in the ground truth's axes.
   void Show(int32_t agent, int64_t revision, double from_s, double to_s, const Offset& offset,
-            const Eigen::Vector3d& place = kPlace) {
+            const Eigen::Vector3d& place = kSeenPlace) {
     for (int i = 0; i <= 800; ++i) {
       const double s = 0.05 * i;
       if (s < from_s || s > to_s) {
         continue;
       }
-      ShownAnchor shown{kKettle, revision, {}};
+      ShownAnchor shown{kSeenKettle, revision, {}};
       shown.T_odom_anchor.t = OdomFromTruth(agent) * (place + offset(s));
       tracks[agent].frames.push_back(
-          {Sensor(s), Wall(s), kMaps[agent], OdomFromTruth(agent) * Truth(agent, s),
+          {Sensor(s), Wall(s), kMaps[agent], OdomFromTruth(agent) * Walk(agent, s),
            std::make_shared<const ShownAnchors>(ShownAnchors{Sensor(s), kMaps[agent], {shown}})});
     }
   }
@@ -129,11 +130,11 @@ struct World {
 
 TEST(ReportAnchors, WhatIsShownWhereItIsHasNoError) {
   World world;
-  world.Place(1, kPlaced_s, kPlace);
-  world.Hear(2, 1, 10.5, kPlace);
+  world.Place(1, kPlaced_s, kSeenPlace);
+  world.Hear(2, 1, 10.5, kSeenPlace);
   world.Show(2, 1, kShown_s, kEnd_s, None);
   const AnchorMetrics kettle = world.All().at(0);
-  EXPECT_EQ(kettle.id, kKettle);
+  EXPECT_EQ(kettle.id, kSeenKettle);
   EXPECT_EQ(kettle.name, "kettle");
   EXPECT_EQ(kettle.made_by, 1);
   EXPECT_TRUE(kettle.placed);
@@ -150,8 +151,8 @@ TEST(ReportAnchors, WhatIsShownWhereItIsHasNoError) {
 
 TEST(ReportAnchors, AKnownOffsetIsTheError) {
   World world;
-  world.Place(1, kPlaced_s, kPlace);
-  world.Hear(2, 1, 10.5, kPlace + Eigen::Vector3d(0, 0.01, 0));
+  world.Place(1, kPlaced_s, kSeenPlace);
+  world.Hear(2, 1, 10.5, kSeenPlace + Eigen::Vector3d(0, 0.01, 0));
   world.Show(2, 1, kShown_s, kEnd_s, [](double) { return Eigen::Vector3d(0.018, -0.024, 0); });
   const AnchorAtAgent at = world.AtSecond();
   EXPECT_NEAR(*at.error_m, 0.03, 2e-5);
@@ -163,7 +164,7 @@ TEST(ReportAnchors, AKnownOffsetIsTheError) {
 
 TEST(ReportAnchors, OnlyWhatIsShownTenSecondsAfterTheFusionCounts) {
   World world;
-  world.Place(1, kPlaced_s, kPlace);
+  world.Place(1, kPlaced_s, kSeenPlace);
   // 0.4 m at first, 0.02 m ten seconds after the fusion, then 0.04 m, and 0.05 m in the last
   // second.
   world.Show(2, 1, kShown_s, kEnd_s, [](double s) -> Eigen::Vector3d {
@@ -181,7 +182,7 @@ TEST(ReportAnchors, OnlyWhatIsShownTenSecondsAfterTheFusionCounts) {
 
 TEST(ReportAnchors, AStepIsAJump) {
   World world;
-  world.Place(1, kPlaced_s, kPlace);
+  world.Place(1, kPlaced_s, kSeenPlace);
   world.Show(2, 1, kShown_s, kEnd_s, [](double s) {
     return s < 25 ? Eigen::Vector3d(0.03, 0, 0.04) : Eigen::Vector3d(0.001 * (s - 25), 0, 0);
   });
@@ -190,20 +191,20 @@ TEST(ReportAnchors, AStepIsAJump) {
 
 TEST(ReportAnchors, WhatAnEditMovedIsNoJumpAndIsTrueWhereItIsNow) {
   World world;
-  const Eigen::Vector3d moved = kPlace + Eigen::Vector3d(0.5, 0, 0);
-  world.Place(1, kPlaced_s, kPlace);
+  const Eigen::Vector3d moved = kSeenPlace + Eigen::Vector3d(0.5, 0, 0);
+  world.Place(1, kPlaced_s, kSeenPlace);
   world.Place(3, 24, moved);
-  AnchorEdit renamed = world.session.anchor_edits[kKettle].front();
+  AnchorEdit renamed = world.session.anchor_edits[kSeenKettle].front();
   renamed.revision = 4;
   renamed.name = "pot";
   renamed.placement = AnchorEdit::Placement::kSame;
-  world.session.anchor_edits[kKettle].push_back(renamed);
+  world.session.anchor_edits[kSeenKettle].push_back(renamed);
   AnchorEdit forbidden = renamed;
   forbidden.revision = 5;
   forbidden.agent_id = 2;
   forbidden.right = AnchorRight::kEditOwn;
   forbidden.placement = AnchorEdit::Placement::kBody;
-  world.session.anchor_edits[kKettle].push_back(forbidden);
+  world.session.anchor_edits[kSeenKettle].push_back(forbidden);
   world.Show(2, 1, kShown_s, 25, None);
   world.Show(2, 3, 25.01, 30, None, moved);
   world.Show(2, 4, 30.01, kEnd_s, None, moved);
@@ -217,7 +218,7 @@ TEST(ReportAnchors, AFusionThatWasUndoneDoesNotCount) {
   World world;
   world.Change(12, {2});
   world.Change(22, {1, 2});
-  world.Place(1, kPlaced_s, kPlace);
+  world.Place(1, kPlaced_s, kSeenPlace);
   world.Show(2, 1, kShown_s, kEnd_s, [](double s) -> Eigen::Vector3d {
     return Eigen::Vector3d::UnitX() * (s < 22 ? 1 : s < 32 ? 0.3 : 0.02);
   });
@@ -236,27 +237,28 @@ TEST(ReportAnchors, PixelsCountWhereTheTruePlaceIsInTheImage) {
   EXPECT_FALSE(world.AtSecond().error_px) << "never in view";
   EXPECT_FALSE(world.AtSecond().view);
   World wrong;
-  wrong.Place(1, kPlaced_s, kPlace);
+  wrong.Place(1, kPlaced_s, kSeenPlace);
   wrong.Show(2, 1, kShown_s, kEnd_s, None, behind);
   EXPECT_DOUBLE_EQ(*wrong.AtSecond().error_px, 800) << "the image's diagonal";
 }
 
 TEST(ReportAnchors, TheViewIsWhereItIsFurthestInside) {
   World world;
-  world.Place(1, kPlaced_s, kPlace);
+  world.Place(1, kPlaced_s, kSeenPlace);
   world.Show(2, 1, kShown_s, kEnd_s, None);
   const AnchorMetrics kettle = world.All().at(0);
   ASSERT_TRUE(kettle.placing && kettle.agents[0].view);
   EXPECT_EQ(kettle.placing->agent, 1);
   EXPECT_EQ(kettle.placing->utime, Sensor(kPlaced_s));
-  EXPECT_LT((kettle.placing->T_cam_anchor.t - Truth(1, kPlaced_s).Inverse() * kPlace).norm(), 2e-4);
+  EXPECT_LT((kettle.placing->T_cam_anchor.t - Walk(1, kPlaced_s).Inverse() * kSeenPlace).norm(),
+            2e-4);
   const AnchorView& view = *kettle.agents[0].view;
   const double s = 1e-6 * static_cast<double>(view.utime - kSensor);
   EXPECT_GE(s, kFused_s + 10);
-  EXPECT_LT((*view.p_truth - Truth(2, s).Inverse() * kPlace).norm(), 2e-5);
+  EXPECT_LT((*view.p_truth - Walk(2, s).Inverse() * kSeenPlace).norm(), 2e-5);
   const CameraModel& camera = world.session.cameras.at(2);
   const auto from_border = [&](double at_s) {
-    const Eigen::Vector2d pixel = *camera.Project(Truth(2, at_s).Inverse() * kPlace);
+    const Eigen::Vector2d pixel = *camera.Project(Walk(2, at_s).Inverse() * kSeenPlace);
     return std::min({pixel.x(), pixel.y(), 1279 - pixel.x(), 959 - pixel.y()});
   };
   for (double other = kFused_s + 10; other <= kEnd_s; other += 1) {
@@ -266,7 +268,7 @@ TEST(ReportAnchors, TheViewIsWhereItIsFurthestInside) {
 
 TEST(ReportAnchors, WhatIsNotKnownHasAReason) {
   World hidden;
-  hidden.Place(1, kPlaced_s, kPlace);
+  hidden.Place(1, kPlaced_s, kSeenPlace);
   EXPECT_EQ(hidden.AtSecond().reason, "agent 2 has not shown it");
   EXPECT_FALSE(hidden.AtSecond().largest_jump_m);
 
@@ -296,13 +298,13 @@ TEST(ReportAnchors, WhatIsNotKnownHasAReason) {
 TEST(ReportAnchors, WhatWasNeverPlacedIsListed) {
   World world;
   AnchorEdit request;
-  request.anchor = kKettle;
+  request.anchor = kSeenKettle;
   request.agent_id = 1;
   request.name = "kettle";
   request.placement = AnchorEdit::Placement::kPixel;
   request.map = kMaps[1];
   request.utime = Sensor(kPlaced_s);
-  world.tracks[1].requests[kKettle] = request;
+  world.tracks[1].requests[kSeenKettle] = request;
   const auto all = world.All({{1, "kettle"}, {2, "pot"}});
   ASSERT_EQ(all.size(), 2u);
   EXPECT_FALSE(all[0].placed);

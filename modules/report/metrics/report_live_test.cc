@@ -12,7 +12,7 @@ const MapId kOlder{1, 100};
 const Rigid3 kMapFromOdom{YawRotation(0.8), {4, -2, 0.5}};
 constexpr int64_t kPeriod = 50'000;
 
-Rigid3 Truth(int i) {
+Rigid3 WalkedPose(int i) {
   const double s = 0.05 * i;
   return {ExpSo3({0.1 * std::sin(s), 0, 0.3 * s}), {3 * std::cos(0.3 * s), 2 * std::sin(s), 0}};
 }
@@ -27,14 +27,14 @@ struct Shown {
   explicit Shown(double error) {
     for (int i = 0; i < 400; ++i) {
       const int64_t utime = i * kPeriod;
-      ground_truth.push_back({utime, Truth(i)});
-      Rigid3 raw = Truth(i);
+      ground_truth.push_back({utime, WalkedPose(i)});
+      Rigid3 raw = WalkedPose(i);
       raw.t *= 0.95;
       LivePose pose{utime, kMap, kMap, i < 100 ? 0 : 3, raw, raw};
       if (i >= 200) {
         pose.frame = kOlder;
         pose.revision = 6;
-        pose.T_map_body = kMapFromOdom * Truth(i);
+        pose.T_map_body = kMapFromOdom * WalkedPose(i);
         pose.T_map_body.t.x() += i / 20 % 2 == 0 ? error : -error;
       }
       poses.push_back(pose);
