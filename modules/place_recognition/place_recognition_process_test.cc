@@ -14,9 +14,9 @@
 namespace pangea {
 namespace {
 
+using test::kMapA;
+using test::kMapB;
 constexpr int kRound = 32;
-const MapId kMapA{1, 1000};
-const MapId kMapB{2, 2000};
 
 using Payload = std::vector<uint8_t>;
 

@@ -13,9 +13,9 @@
 namespace pangea {
 namespace {
 
+using test::kMapA;
+using test::kMapB;
 constexpr double kStepYaw = 0.1;
-const MapId kMapA{1, 1000};
-const MapId kMapB{2, 2000};
 const Rigid3 kOdomB(YawRotation(1.1), Eigen::Vector3d(3, -2, 0.5));
 
 // A body rotating on a small circle: one round is 63 keyframes.

@@ -13,6 +13,9 @@
 
 namespace pangea::test {
 
+inline const MapId kMapA{1, 1000};
+inline const MapId kMapB{2, 2000};
+
 struct TestWorldOptions {
   int num_points = 6000;
   double room_m = 12;     // a box, room_m x room_m x 4
