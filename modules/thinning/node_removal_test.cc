@@ -137,6 +137,21 @@ TEST_F(NodeRemovalTest, OfAStarLeavesTheMarginalsToTheBestKnown) {
 }
 
 // Two removed keyframes are both connected to one that stays: they give a single factor.
+// An odometry may say that an edge of it knows nothing, with variances of up to 1e12.
+TEST_F(NodeRemovalTest, TheAverageWithWhatKnowsNothingIsACovariance) {
+  const Rigid3 a = RandomPose(), b = RandomPose();
+  for (int i = 0; i < 20; ++i) {
+    RelativePose nothing = Measure(a, b);
+    nothing.covariance *= 1e15;
+    const RelativePose known = Measure(a, b);
+    for (const RelativePose& mean : {Average(nothing, known), Average(known, nothing)}) {
+      EXPECT_EQ(mean.covariance.llt().info(), Eigen::Success) << i;
+      EXPECT_TRUE(mean.covariance.isApprox(known.covariance, 1e-3)) << i;
+      EXPECT_LT(mean.T_from_to.Minus(known.T_from_to).norm(), 1e-6) << i;
+    }
+  }
+}
+
 TEST_F(NodeRemovalTest, AveragesWhatIsBetweenTheSameTwo) {
   std::vector<Rigid3> poses;
   for (int i = 0; i < 4; ++i) {

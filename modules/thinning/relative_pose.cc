@@ -20,7 +20,10 @@ RelativePose Average(const RelativePose& a, const RelativePose& b) {
   const Matrix6d gain = sum.solve(a.covariance).transpose();
   RelativePose mean;
   mean.T_from_to = a.T_from_to.Plus(gain * b.T_from_to.Minus(a.T_from_to));
-  const Matrix6d covariance = a.covariance - gain * a.covariance;
+  // Joseph's form stays positive definite, however different A and B are; A - K A does not.
+  const Matrix6d rest = Matrix6d::Identity() - gain;
+  const Matrix6d covariance =
+      rest * a.covariance * rest.transpose() + gain * b.covariance * gain.transpose();
   mean.covariance = 0.5 * (covariance + covariance.transpose());
   return mean;
 }
