@@ -7,6 +7,8 @@
 #include <fstream>
 #include <stdexcept>
 
+#include "recording/test_complaint.h"
+
 namespace pangea {
 namespace {
 
@@ -27,16 +29,6 @@ const std::string kNoise =
     "accelerometer_noise_density: 0.0028\naccelerometer_random_walk: 0.00086\n"
     "gyroscope_noise_density: 0.00016\ngyroscope_random_walk: 2.2e-05\n"
     "rostopic: /imu0\nupdate_rate: 199.0\n";
-
-template <typename Parse>
-std::string Complaint(const Parse& parse) {
-  try {
-    parse();
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
-  return "";
-}
 
 TEST(EurocCalibration, KalibrsCamchainIsUnderstood) {
   const CameraModel camera = ParseEurocCamera(kCamchain, "camchain.yaml");

@@ -10,6 +10,7 @@
 
 #include "files/csv.h"
 #include "options/yaml_options.h"
+#include "recording/test_complaint.h"
 #include "recording/trajectory.h"
 
 namespace pangea {
@@ -27,15 +28,6 @@ class TextFileTest : public ::testing::Test {
 
   const std::string folder_ = ::testing::TempDir() + "pangea_text_file";
 };
-
-std::string Complaint(const std::function<void()>& read) {
-  try {
-    read();
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
-  return "";
-}
 
 TEST_F(TextFileTest, ReadsWhatWasWrittenAlsoByALink) {
   WriteTextFile(Path("a"), "one\ntwo");
