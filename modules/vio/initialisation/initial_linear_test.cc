@@ -18,35 +18,35 @@ std::optional<double> OffsetOf(const StartWorld& world) {
 
 TEST(SolveTimeOffset, FindsHowMuchLaterTheImagesWereTaken) {
   for (const double late_s : {-0.045, -0.02, 0.0235, 0.03, 0.05}) {
-    const auto found = OffsetOf(Record(Lively, late_s, kRaySigma));
+    const auto found = OffsetOf(Record(Lively, late_s, kStartRaySigma));
     ASSERT_TRUE(found) << late_s;
     EXPECT_NEAR(*found, late_s, 0.0015);
   }
 }
 
 TEST(SolveTimeOffset, SaysNothingWhenNothingIsGained) {
-  EXPECT_FALSE(OffsetOf(Record(Lively, 0, kRaySigma)));
-  EXPECT_FALSE(OffsetOf(Record(Lively, 0.001, kRaySigma)));
+  EXPECT_FALSE(OffsetOf(Record(Lively, 0, kStartRaySigma)));
+  EXPECT_FALSE(OffsetOf(Record(Lively, 0.001, kStartRaySigma)));
 }
 
 // At a constant rotation rate every offset explains the rotations equally well.
 TEST(SolveTimeOffset, SaysNothingWhenTheRotationRateDoesNotVary) {
-  EXPECT_FALSE(OffsetOf(Record(RotatingEvenly, 0.03, kRaySigma)));
+  EXPECT_FALSE(OffsetOf(Record(RotatingEvenly, 0.03, kStartRaySigma)));
 }
 
 TEST(SolveTimeOffset, SaysNothingBeyondWhatItSearches) {
-  EXPECT_FALSE(OffsetOf(Record(Lively, 0.09, kRaySigma)));
+  EXPECT_FALSE(OffsetOf(Record(Lively, 0.09, kStartRaySigma)));
 }
 
 TEST(SolveTimeOffset, SaysNothingWithoutEnoughSamplesOrTracks) {
-  StartWorld world = Record(Lively, 0.03, kRaySigma);
+  StartWorld world = Record(Lively, 0.03, kStartRaySigma);
   EXPECT_FALSE(SolveTimeOffset(world.frames, kT_body_cam, {}, ImuNoise{}));
   world.frames.resize(6);
   EXPECT_FALSE(OffsetOf(world));
 }
 
 TEST(SolveGyroBias, FindsTheBias) {
-  const StartWorld world = Record(Lively, 0, kRaySigma);
+  const StartWorld world = Record(Lively, 0, kStartRaySigma);
   const auto bias = SolveGyroBias(world.frames, kT_body_cam, ImuNoise{});
   ASSERT_TRUE(bias);
   EXPECT_LT((*bias - kGyroBias).norm(), 2e-3);

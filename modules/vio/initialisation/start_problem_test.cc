@@ -28,7 +28,7 @@ StartProblem ExactProblem(double stamp_sigma_s) {
   std::mt19937_64 rng(3);
   StartProblem problem;
   problem.T_body_cam = kT_body_cam;
-  problem.ray_sigma = kRaySigma;
+  problem.ray_sigma = kStartRaySigma;
   problem.expected_gyro_bias = kGyroBias;
   problem.stamp_sigma_s = stamp_sigma_s;
   for (int i = 0; i < kStartFrames; ++i) {
@@ -159,10 +159,10 @@ TEST_P(StartProblemTest, CovarianceIsThatOfTheNewestFrame) {
   EXPECT_LT((*covariance - expected).norm(), 1e-4 * expected.norm());
 }
 
-constexpr StartSigmas kSigmas = {.ray = kRaySigma};
+constexpr StartSigmas kSigmas = {.ray = kStartRaySigma};
 
 TEST(Refine, ComesToTheSameFromAThirdOfTheScale) {
-  const StartWorld world = Record(Lively, 0, kRaySigma);
+  const StartWorld world = Record(Lively, 0, kStartRaySigma);
   const auto start = SolveLinear(world.frames, kT_body_cam, ImuNoise{}, kGyroBias);
   ASSERT_TRUE(start);
   const auto refine = [&](double scale) {
@@ -183,7 +183,7 @@ double VelocityNees(double late_s, double stamp_sigma_s, const StartSigmas& sigm
   constexpr int kSeeds = 10;
   double sum = 0;
   for (uint64_t seed = 1; seed <= kSeeds; ++seed) {
-    const StartWorld world = Record(Lively, late_s, kRaySigma, 0.1, seed, stamp_sigma_s);
+    const StartWorld world = Record(Lively, late_s, kStartRaySigma, 0.1, seed, stamp_sigma_s);
     const auto start = SolveLinear(world.frames, kT_body_cam, ImuNoise{}, kGyroBias);
     const auto refined =
         start ? Refine(world.frames, kT_body_cam, ImuNoise{}, kGyroBias, *start, sigmas)
@@ -231,7 +231,7 @@ Rigid3 Forward(double t) {
 // A point that the closed form places just in front of one camera and behind the others has only
 // one ray, so it does not move when that camera moves ahead.
 TEST(Refine, APointThatCountsOneRayDoesNotHoldTheScale) {
-  StartWorld world = Record(Forward, 0, kRaySigma);
+  StartWorld world = Record(Forward, 0, kStartRaySigma);
   world.frames.resize(11);
   const auto start = SolveLinear(world.frames, kT_body_cam, ImuNoise{}, kGyroBias);
   ASSERT_TRUE(start);
@@ -248,7 +248,7 @@ TEST(Refine, APointThatCountsOneRayDoesNotHoldTheScale) {
 }
 
 TEST(Refine, DoesNotTryWithPointsBehindTheCamera) {
-  const StartWorld world = Record(Lively, 0, kRaySigma);
+  const StartWorld world = Record(Lively, 0, kStartRaySigma);
   auto start = SolveLinear(world.frames, kT_body_cam, ImuNoise{}, kGyroBias);
   ASSERT_TRUE(start);
   for (auto& [id, p] : start->p_first) {
@@ -262,7 +262,7 @@ TEST(Refine, DoesNotTryWithPointsBehindTheCamera) {
 
 TEST(Refine, ALargeAccelerometerBiasIsFoundWhereItIsExpected) {
   const Vector3d bias(0.6, -0.5, 0.4);
-  StartWorld world = Record(Lively, 0, kRaySigma);
+  StartWorld world = Record(Lively, 0, kStartRaySigma);
   for (StartFrame& frame : world.frames) {
     for (ImuSample& sample : frame.imu) {
       sample.accel += bias;
@@ -272,7 +272,7 @@ TEST(Refine, ALargeAccelerometerBiasIsFoundWhereItIsExpected) {
   ASSERT_TRUE(start);
   const auto error = [&](double accel_bias_sigma) {
     const auto refined = Refine(world.frames, kT_body_cam, ImuNoise{}, kGyroBias, *start,
-                                {.ray = kRaySigma, .accel_bias = accel_bias_sigma});
+                                {.ray = kStartRaySigma, .accel_bias = accel_bias_sigma});
     return refined ? (refined->states.back().accel_bias - bias).norm() : 1e9;
   };
   EXPECT_LT(error(1), 0.5 * error(0.05));
@@ -284,7 +284,7 @@ Rigid3 Gentle(double t) {
 }
 
 StartWorld GentleWithBias(const Vector3d& bias) {
-  StartWorld world = Record(Gentle, 0, kRaySigma);
+  StartWorld world = Record(Gentle, 0, kStartRaySigma);
   for (StartFrame& frame : world.frames) {
     for (ImuSample& sample : frame.imu) {
       sample.accel += bias;

@@ -11,7 +11,7 @@
 
 namespace pangea::vio {
 
-inline constexpr double kRaySigma = 0.5 / 400;
+inline constexpr double kStartRaySigma = 0.5 / 400;
 inline const Eigen::Vector3d kGyroBias(0.02, -0.03, 0.01);
 inline const Rigid3 kT_body_cam{LookingAhead() * ExpSo3({0.05, -0.03, 0.02}), {0.05, -0.02, 0.01}};
 

@@ -8,7 +8,7 @@
 namespace pangea::vio {
 namespace {
 
-double Found(double jitter_s, double late_s, int frames) {
+double FoundJitter(double jitter_s, double late_s, int frames) {
   std::mt19937_64 rng(3);
   std::normal_distribution<double> normal(0, jitter_s);
   StampJitter jitter;
@@ -24,16 +24,16 @@ double Found(double jitter_s, double late_s, int frames) {
 
 TEST(StampJitter, IsFoundBesideLateStampsAndChangesOfTheRate) {
   for (const double sigma_s : {0.002, 0.005}) {
-    EXPECT_NEAR(Found(sigma_s, 0.02, 60), sigma_s, 0.4 * sigma_s);
+    EXPECT_NEAR(FoundJitter(sigma_s, 0.02, 60), sigma_s, 0.4 * sigma_s);
   }
 }
 
 TEST(StampJitter, OfExactStampsIsNone) {
-  EXPECT_EQ(Found(0, 0, 60), 0);
-  EXPECT_EQ(Found(5e-5, 0.02, 60), 0);  // rounding errors, and a few late stamps
+  EXPECT_EQ(FoundJitter(0, 0, 60), 0);
+  EXPECT_EQ(FoundJitter(5e-5, 0.02, 60), 0);  // rounding errors, and a few late stamps
 }
 
-TEST(StampJitter, IsNotGuessedFromAFewStamps) { EXPECT_EQ(Found(0.005, 0, 7), 0); }
+TEST(StampJitter, IsNotGuessedFromAFewStamps) { EXPECT_EQ(FoundJitter(0.005, 0, 7), 0); }
 
 }  // namespace
 }  // namespace pangea::vio

@@ -18,14 +18,14 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr int kMarginalisations = 40;
-constexpr int kViews = 8;            // largest number of images with a landmark
-constexpr double kSpread = 0.01;     // of every error of the window, at each linearisation
-constexpr double kRaySigma = 0.002;  // 0.8 px
+constexpr int kViews = 8;                 // largest number of images with a landmark
+constexpr double kSpread = 0.01;          // of every error of the window, at each linearisation
+constexpr double kGaugeRaySigma = 0.002;  // 0.8 px
 
 // A ride as one long window at its true state, with inertial samples between its images and noisy
 // rays. Its prior has only information on the IMU's axes: rotated together with body and camera,
 // they would be those of another body.
-WindowProblem Ride(uint64_t seed) {
+WindowProblem RideWindow(uint64_t seed) {
   VioTestWorldOptions options;
   options.seed = seed;
   options.outlier_share = 0;
@@ -61,7 +61,7 @@ WindowProblem Ride(uint64_t seed) {
         const double depth = *world.TrueDepth(seen.landmark_id, frame.utime);
         landmark = {seen.landmark_id, {i, 0, {seen.ray.x(), seen.ray.y(), 1 / depth}}, {}};
       }
-      landmark.rays.push_back({i, seen.ray, kRaySigma, 0});
+      landmark.rays.push_back({i, seen.ray, kGaugeRaySigma, 0});
     }
   }
   for (const auto& [id, landmark] : open) {
@@ -138,7 +138,7 @@ Knowledge Known(const WindowPrior& prior) {
 
 TEST(WindowGauge, FortyMarginalisationsLearnNothingOfPositionAndYaw) {
   for (uint64_t seed = 1; seed <= 3; ++seed) {
-    const WindowProblem ride = Ride(seed);
+    const WindowProblem ride = RideWindow(seed);
     const Knowledge invariant = Known(Marginalised(ride, false));
     const Knowledge plain = Known(Marginalised(ride, true));
     std::cout << "ride " << seed << ": position and yaw " << invariant.of_gauge
