@@ -13,7 +13,7 @@
 namespace pangea::session {
 namespace {
 
-const MapId kFirst{2, 100}, kSecond{2, 200};
+const MapId kFirstMap{2, 100}, kSecondMap{2, 200};
 
 class SessionMonitorTest : public ::testing::Test {
  protected:
@@ -51,17 +51,17 @@ class SessionMonitorTest : public ::testing::Test {
 
 // Maps of the agent that it has left are corrected too.
 TEST_F(SessionMonitorTest, TheDriftIsThatOfTheMapTheAgentIsIn) {
-  PublishPose(kFirst, 10);
-  PublishCorrection(kFirst, 1, 0.5);
+  PublishPose(kFirstMap, 10);
+  PublishCorrection(kFirstMap, 1, 0.5);
   EXPECT_EQ(drift_m(), 0) << "where it joined its group";
-  PublishCorrection(kFirst, 2, 0.6);
+  PublishCorrection(kFirstMap, 2, 0.6);
   EXPECT_NEAR(drift_m(), 1, 0.01);
-  PublishPose(kSecond, 50);
+  PublishPose(kSecondMap, 50);
   EXPECT_EQ(drift_m(), 0);
-  PublishCorrection(kFirst, 3, 0.7);
+  PublishCorrection(kFirstMap, 3, 0.7);
   EXPECT_EQ(drift_m(), 0) << "of the other map";
-  PublishCorrection(kSecond, 3, 0);
-  PublishCorrection(kSecond, 4, 0.02);
+  PublishCorrection(kSecondMap, 3, 0);
+  PublishCorrection(kSecondMap, 4, 0.02);
   EXPECT_NEAR(drift_m(), 1, 0.01);
 }
 
@@ -79,7 +79,7 @@ TEST_F(SessionMonitorTest, CpuTimeIsThatOfAllStartsOfAProcess) {
 TEST_F(SessionMonitorTest, KeyframesAreLostThatTheServerNeverAcknowledges) {
   for (int32_t seq = 0; seq < 5; ++seq) {
     KeyframeMessage keyframe{};
-    keyframe.id.map = ToMessage(kFirst);
+    keyframe.id.map = ToMessage(kFirstMap);
     keyframe.id.seq = seq;
     Publish(channels::Keyframe(2), keyframe);
   }
@@ -88,7 +88,7 @@ TEST_F(SessionMonitorTest, KeyframesAreLostThatTheServerNeverAcknowledges) {
   const auto publish_have = [this](int32_t highest_seq) {
     have_t have{};
     have.num_maps = 1;
-    have.maps = {ToMessage(kFirst)};
+    have.maps = {ToMessage(kFirstMap)};
     have.highest_seq = {highest_seq};
     Publish(std::string(channels::kHave), have);
   };
