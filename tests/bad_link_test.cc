@@ -19,7 +19,6 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 
-constexpr double kTolerance_m = 0.005;
 constexpr double kPlayed_s = 9;  // enough packets to lose
 
 fs::path Sample() { return fs::path(PANGEA_SOURCE_DIR) / "logs" / "two_walks"; }

@@ -15,7 +15,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kTolerance_m = 0.005;
 constexpr int kTries = 60;  // one per second, until the processes have finished their work
 
 std::string LoopbackUrl() {

@@ -27,6 +27,8 @@ nlohmann::json ReadJson(const std::filesystem::path& path);
 // Root mean square distance, metres, between the keyframes of two TUM files in the same frame;
 // infinite if the first does not exist, or if the keyframes are not the same.
 double Distance_m(const std::filesystem::path& got, const std::filesystem::path& expected);
+// What rounding by a compiler may cause after thousands of optimisation steps, metres.
+inline constexpr double kTolerance_m = 0.005;
 
 // The recording walk_1 or walk_2: walks of 14 s through one hall, at half the image size, rendered
 // by ctest (the fixture `walks` in CMakeLists.txt).

@@ -10,9 +10,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Differences, m, that rounding by a compiler may cause after thousands of optimisation steps.
-constexpr double kTolerance_m = 0.005;
-
 TEST(ReplayGolden, TwoWalks) {
   const fs::path sample = fs::path(PANGEA_SOURCE_DIR) / "logs" / "two_walks";
   const fs::path out = FreshFolder("golden") / "out";
