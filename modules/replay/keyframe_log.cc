@@ -20,8 +20,10 @@ namespace {
 // Throws with the missing keyframes: "map 1/17…: keyframes 12 to 15 are missing". If an odometry
 // edge leads across a gap, its keyframes do not exist, and no process waits for them. `edges`: the
 // seq at which each keyframe's edge begins.
+// `refused`: the keyframes that the server's processes would refuse.
 void CheckGaps(const std::filesystem::path& log, const std::map<MapId, std::set<int32_t>>& seqs,
-               const std::map<KeyframeId, int32_t>& edges, const LogReading& reading) {
+               const std::map<KeyframeId, int32_t>& edges, const std::string& refused,
+               const LogReading& reading) {
   std::string gaps;
   for (const auto& [map, present] : seqs) {
     int32_t next = 0;
@@ -38,8 +40,8 @@ void CheckGaps(const std::filesystem::path& log, const std::map<MapId, std::set<
     return;
   }
   throw std::runtime_error(fmt::format(
-      "{}: keyframes are missing, and a replay without them would not be the same:{}\n{}",
-      log.string(), gaps,
+      "{}: keyframes are missing, and a replay without them would not be the same:{}{}\n{}",
+      log.string(), gaps, refused,
       reading.whole()
           ? "The server's journal (journal.lcm beside a session.lcm) has every keyframe: "
             "replay that."
@@ -67,6 +69,7 @@ std::vector<LoggedKeyframe> ReadKeyframeLog(const std::filesystem::path& log,
   std::vector<LoggedKeyframe> keyframes;
   std::map<MapId, std::set<int32_t>> seqs;
   std::map<KeyframeId, int32_t> edges;
+  std::string refused;
   std::optional<int64_t> begin;
   int64_t latest = std::numeric_limits<int64_t>::min();
   const auto take = [&](const LogEvent& event) {
@@ -89,7 +92,11 @@ std::vector<LoggedKeyframe> ReadKeyframeLog(const std::filesystem::path& log,
     keyframe.utime = message.utime;
     keyframe.captured_utime = latest;
     keyframe.elapsed_us = latest - *begin;
-    if (seqs[keyframe.id.map].insert(keyframe.id.seq).second) {
+    if (const auto parsed = Parse(message); !parsed.value) {
+      refused += fmt::format("\n  event {} on {} is refused: {}", event.number, event.channel,
+                             parsed.refused);
+      keyframes.push_back(std::move(keyframe));
+    } else if (seqs[keyframe.id.map].insert(keyframe.id.seq).second) {
       if (message.has_edge) {
         edges[keyframe.id] = message.edge_from_seq;
       }
@@ -100,7 +107,8 @@ std::vector<LoggedKeyframe> ReadKeyframeLog(const std::filesystem::path& log,
   if (keyframes.empty()) {
     throw std::runtime_error(fmt::format("{}: no KEYFRAME_* in this log", log.string()));
   }
-  CheckGaps(log, seqs, edges, readings == nullptr ? LogReading() : readings->at(log.string()));
+  CheckGaps(log, seqs, edges, refused,
+            readings == nullptr ? LogReading() : readings->at(log.string()));
   return keyframes;
 }
 

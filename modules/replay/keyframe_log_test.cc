@@ -5,9 +5,11 @@
 
 #include <filesystem>
 
+#include "core/testing/test_cameras.h"
 #include "log_file/log_writer.h"
 #include "messages/encoding.h"
 #include "messages/keyframe_message.h"
+#include "messages/messages.h"
 
 namespace pangea {
 namespace {
@@ -19,6 +21,7 @@ struct Captured {
   int32_t seq = 0;
   int64_t utime = 0;  // sensor clock
   int64_t captured_utime = 0;
+  bool damaged = false;
 };
 
 std::filesystem::path WriteLog(const std::string& name, const std::vector<Captured>& keyframes) {
@@ -26,11 +29,14 @@ std::filesystem::path WriteLog(const std::string& name, const std::vector<Captur
   std::filesystem::remove(path);
   LogFileWriter file(path.string());
   for (const Captured& keyframe : keyframes) {
-    KeyframeMessage message{};
-    message.id.map.agent_id = keyframe.agent;
-    message.id.map.opened_utime = 100;
-    message.id.seq = keyframe.seq;
-    message.utime = keyframe.utime;
+    Keyframe whole;
+    whole.id = {{keyframe.agent, 100}, keyframe.seq};
+    whole.utime = keyframe.utime;
+    whole.camera = EurocTestCamera();
+    KeyframeMessage message = ToMessage(whole);
+    if (keyframe.damaged) {
+      message.camera.T_body_cam.rotation.w = 5;
+    }
     file.Write(keyframe.captured_utime, "KEYFRAME_" + std::to_string(keyframe.agent),
                EncodeMessage(message));
   }
@@ -83,6 +89,17 @@ TEST(KeyframeLog, OfOneAgent) {
 TEST(KeyframeLog, NamesGaps) {
   EXPECT_THAT(ErrorOf(WriteLog("gap.lcm", 3, {{0, 10}, {4, 20}})),
               testing::AllOf(HasSubstr("gap.lcm"), HasSubstr("3/100"), HasSubstr("1 to 3")));
+}
+
+// Its bytes are those of a keyframe, but not its values: every process ignores it.
+TEST(KeyframeLog, ARefusedKeyframeIsMissing) {
+  EXPECT_THAT(
+      ErrorOf(WriteLog("refused.lcm", {{3, 0, 10, 10}, {3, 1, 20, 20, true}, {3, 2, 30, 30}})),
+      testing::AllOf(HasSubstr("keyframes 1 to 1"), HasSubstr("event 1 on KEYFRAME_3"),
+                     HasSubstr("quaternion")));
+  EXPECT_EQ(
+      ReadKeyframeLog(WriteLog("refused_last.lcm", {{3, 0, 10, 10}, {3, 1, 20, 20, true}})).size(),
+      2U);
 }
 
 TEST(KeyframeLog, SaysWhenThereIsNothing) {
