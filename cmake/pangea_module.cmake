@@ -133,7 +133,7 @@ function(pangea_test_program name)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   # A test spends its time in the libraries; with -O1, its own code compiles a third faster. Most of
-  # that time is headers, so that one large unit takes half the time of two.
+  # that time is headers: larger units than the libraries' parse them less often.
   target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-O1>)
   set_target_properties(${name} PROPERTIES UNITY_BUILD_BATCH_SIZE 25)
   pangea_include_root(root)
