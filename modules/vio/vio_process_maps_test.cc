@@ -101,10 +101,10 @@ TEST_F(VioProcessTest, AMapThatIsLostBeforeItsFirstKeyframeEndsToo) {
   options_.out_tum = ::testing::TempDir() + "vio_process_lost_early.tum";
   VioProcess process(bus_, options_, 0);
   process.Open(world_.camera(), ImuNoise{});
-  Play(process, 0, 2);
+  Play(process, 0, 3);
   ASSERT_EQ(poses_.back().state, pose_t::STATE_TRACKING) << poses_.back().reason;
   const cv::Mat image = RandomTexture(752, 480, 11);
-  for (int64_t utime = 2'000'000; utime < 2'300'000; utime += kImageStep_us) {  // it is thrown
+  for (int64_t utime = 3'000'000; utime < 3'300'000; utime += kImageStep_us) {  // it is thrown
     std::vector<ImuSample> imu;
     for (; next_imu_ <= utime; next_imu_ += kImuStep_us) {
       imu.push_back({next_imu_, Eigen::Vector3d::Zero(), Eigen::Vector3d(400, 0, 0)});
@@ -114,7 +114,7 @@ TEST_F(VioProcessTest, AMapThatIsLostBeforeItsFirstKeyframeEndsToo) {
   bus_.Drain();
   ASSERT_TRUE(keyframes_.empty());
   const size_t before = poses_.size();
-  Play(process, 2.3, 7);
+  Play(process, 3.3, 7);
   ASSERT_EQ(poses_.back().state, pose_t::STATE_TRACKING) << poses_.back().reason;
   int64_t lost = 0, of_first = 0;
   for (size_t i = 0; i < poses_.size(); ++i) {

@@ -83,7 +83,6 @@ struct Estimator::Impl {
   std::vector<int32_t> Solve(int max_iterations);
   void MarginaliseLandmarks(int frame);
   void ShrinkWindow(std::vector<FinishedKeyframe>* finished);
-  int NewestDue() const;
   void PublishUpTo(int newest, std::vector<FinishedKeyframe>* finished);
   // On the IMU's clock, with the time offset of the newest image.
   int64_t ImuTime(int64_t frame_utime) const {
@@ -230,22 +229,6 @@ std::vector<int32_t> Estimator::Impl::Solve(int max_iterations) {
   return outliers;
 }
 
-// Keyframes up to this frame are published, or -1: half the window's keyframes follow it, or it has
-// waited long enough. The whole window would make depths hardly better, and the map is late by as
-// much (docs/decisions/live_pose.md).
-int Estimator::Impl::NewestDue() const {
-  const WindowState& state = problem.state;
-  int followers = 0;
-  for (int i = state.Newest(); i >= 0; --i) {
-    if (followers >= options.window / 2 ||
-        Seconds(state.frames.back().utime - state.frames[i].utime) > kKeyframeInterval_s) {
-      return i;
-    }
-    followers += state.frames[i].is_window_keyframe ? 1 : 0;
-  }
-  return -1;
-}
-
 // Publishes the keyframes up to frame `newest` that are not yet published.
 void Estimator::Impl::PublishUpTo(int newest, std::vector<FinishedKeyframe>* finished) {
   std::vector<int> due;
@@ -270,12 +253,17 @@ void Estimator::Impl::PublishUpTo(int newest, std::vector<FinishedKeyframe>* fin
 
 void Estimator::Impl::ShrinkWindow(std::vector<FinishedKeyframe>* finished) {
   WindowState& state = problem.state;
-  PublishUpTo(NewestDue(), finished);
+  int due = -1;  // keyframes up to this frame have waited long enough
+  for (int i = 0; i <= state.Newest(); ++i) {
+    due = Seconds(Newest().utime - state.frames[i].utime) > kKeyframeInterval_s ? i : due;
+  }
+  PublishUpTo(due, finished);
   while (Newest().is_window_keyframe) {
     const int oldest = state.frames.front().pose_only ? 1 : 0;
     if (state.Newest() + 1 - oldest <= options.window) {
       break;
     }
+    PublishUpTo(oldest, finished);
     const int64_t published = keyframe_edges.last_utime().value_or(0);
     Marginalisation what;
     what.keep_pose = state.frames[oldest].utime == published;

@@ -64,7 +64,7 @@ struct LandmarkDepth {
   double inverse_depth_var = 0;  // 1/m^2
 };
 
-// A keyframe that half the window follows, or that has waited long enough; its values are final.
+// A keyframe that left the window or has waited long enough; all its values are final.
 struct FinishedKeyframe {
   int64_t utime = 0;  // of the TrackedFrame
   Rigid3 T_odom_body;

@@ -230,7 +230,7 @@ TEST(Estimator, KeyframesAreCompleteConsistentAndHonest) {
       const FinishedKeyframe& previous = ride.finished[k - 1];
       const Vector6d correction =
           (previous.T_odom_body * keyframe.edge->T_previous_this).Minus(keyframe.T_odom_body);
-      EXPECT_LT(correction.norm(), 0.1);
+      EXPECT_LT(correction.norm(), 0.05);
       const Rigid3 T_true_edge =
           ride.world.TruthAt(previous.utime).T_odom_body.Inverse() * truth.T_odom_body;
       const Vector6d e = T_true_edge.Minus(keyframe.edge->T_previous_this);
