@@ -21,11 +21,11 @@ struct LoggedKeyframe {
   int64_t elapsed_us = 0;      // capture time since the log's first event
 };
 
-// All distinct keyframes of one log, in log order. One whose values are refused does not count as
-// there. Throws std::runtime_error that names the log if
+// All distinct keyframes of one log, in log order. Throws std::runtime_error that names the log if
 // it cannot be read, a keyframe does not decode, it has no keyframe, or a map's keyframes are out
-// of order or have gaps without an odometry edge across them (the message lists them). Damaged
-// parts of the log are reported in `readings` (log_reader.h).
+// of order or have gaps without an odometry edge across them (the message lists them); a keyframe
+// whose values the server refuses is such a gap. Damaged parts of the log are reported in
+// `readings` (log_reader.h).
 std::vector<LoggedKeyframe> ReadKeyframeLog(const std::filesystem::path& log,
                                             LogReadings* readings = nullptr);
 
