@@ -17,6 +17,7 @@ ROWS = {
     "delay_50": "delay_ms: 50",
     "delay_500": "delay_ms: 500",
     "delay_2000": "delay_ms: 2000",
+    "loss_20_delay_2000": "loss: 0.2, delay_ms: 2000",
     "jitter_50": "delay_ms: 50, jitter_ms: 50",
     "reorder_5": "reorder: 0.05",
     "duplicate_5": "duplicate: 0.05",

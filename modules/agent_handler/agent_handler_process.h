@@ -27,7 +27,7 @@ namespace pangea {
 
 class AgentHandlerProcess : public PolledProcess {
  public:
-  // Further keys are refused. The receive caches of all agents take at most 210 MB.
+  // Further keys are refused. The receive caches of all agents take at most 1 GB.
   static constexpr size_t kMaxAgents = KeyFolder::kMaxKeys;
 
   // `now_utime`: wall clock. `before_mend`: as for Journal. Throws std::runtime_error if the

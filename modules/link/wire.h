@@ -48,7 +48,7 @@ static_assert(kMaxPayloadBytes + 1000 < kMaxLinkPacketBytes);
 static_assert(kMaxLinkPacketBytes + UdpmAssembler::kMaxChannel + 1 <= kMaxUdpmShortBytes);
 // Bounds that let a hello and an acknowledgement fit one Ethernet frame. kMaxPartialKeyframes is
 // the number of incomplete keyframes of one agent in the receive cache.
-inline constexpr int kMaxPartialKeyframes = 16;
+inline constexpr int kMaxPartialKeyframes = 32;
 inline constexpr int kMaxLinkMaps = 20;
 inline constexpr size_t kMaxSoftwareName = 40;
 inline constexpr int kMaxAckMaps = 40;

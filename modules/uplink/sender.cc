@@ -18,6 +18,7 @@ constexpr int kQuickTries = 6;
 constexpr double kMinTimeout_us = 100e3;
 constexpr double kMaxTimeout_us = 10e6;
 constexpr double kAckDelay_us = 50e3;
+constexpr double kLongRoundTrip_us = 1e6;
 
 }  // namespace
 
@@ -243,6 +244,12 @@ std::vector<Sender::Sent> Sender::Poll(int64_t now_us) {
   return sent;
 }
 
+// A repeat is sent twice if the round trip is long: a keyframe, and all after it, waits for the
+// last of its pieces, and a third try would come seconds later.
+int Sender::Copies(const Piece& piece) const {
+  return piece.tries > 0 && round_trip_us_ > kLongRoundTrip_us ? 2 : 1;
+}
+
 void Sender::SendPieces(const KeyframeId& id, Item* item, int64_t now_us, std::vector<Sent>* out) {
   const int count = NumPieces(static_cast<int>(item->bytes.size()), options_.payload_bytes);
   item->pieces.resize(static_cast<size_t>(count));
@@ -257,11 +264,16 @@ void Sender::SendPieces(const KeyframeId& id, Item* item, int64_t now_us, std::v
     if (!pacer_.Ready() || in_flight_bytes_ + size > options_.max_in_flight_bytes) {
       return;
     }
-    resent_ += piece.tries > 0 ? 1 : 0;
-    piece = {NextNumber(now_us), now_us, piece.tries + 1, true, false};
-    pacer_.Take(size);
+    const int copies = Copies(piece);
+    resent_ += piece.tries > 0 ? copies : 0;
+    piece = {0, now_us, piece.tries + 1, true, false};
     in_flight_bytes_ += size;
-    out->push_back({piece.number, id, {0, static_cast<uint8_t>(id.seq), i, i == count - 1, data}});
+    for (int copy = 0; copy < copies; ++copy) {
+      piece.number = NextNumber(now_us);
+      pacer_.Take(size);
+      out->push_back(
+          {piece.number, id, {0, static_cast<uint8_t>(id.seq), i, i == count - 1, data}});
+    }
   }
 }
 

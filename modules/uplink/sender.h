@@ -7,6 +7,7 @@
 // The keyframes of a map are sent in seq order without gaps, so the receiver holds only the few
 // that are under way. A packet counts as lost if one sent 24 numbers later has arrived, or after a
 // time-out, which follows the measured round trip (RFC 6298's estimator) and doubles with each try.
+// If the round trip takes over a second, a lost packet is sent twice.
 //
 // Of several maps the current one is sent first, because its keyframes show new places, and its
 // loop closures help the agent now. The others, by descending id, use the bandwidth that is left.
@@ -37,8 +38,8 @@ struct SenderOptions {
   double bandwidth_kb_per_s = 4000;  // at most, for keyframe packets and their repeats
   // Bytes sent and neither received nor lost: at most the size of the receiver's cache (the paper,
   // section IV.B). A smaller window would slow down links with a long round trip: 50 kB/s at 4 s
-  // need 200 kB.
-  int max_in_flight_bytes = 210 * 1024;
+  // need 200 kB, and half as much again if a fifth of the packets is lost.
+  int max_in_flight_bytes = 320 * 1024;
   int64_t max_spool_bytes = 256 << 20;  // in memory; about 9,000 keyframes, an hour of walking
   // Why the options cannot be used, or nothing.
   std::optional<std::string> Invalid() const;
@@ -117,6 +118,7 @@ class Sender {
   void MeasureRoundTrip(int64_t highest_number, int64_t now_us);
   void FindLost(int64_t highest_number, int64_t now_us);
   int64_t Timeout_us(int tries) const;
+  int Copies(const Piece& piece) const;
   std::vector<KeyframeId> UnderWay() const;
   bool AddUnderWay(const KeyframeId& next, std::vector<KeyframeId>* ids, int64_t* bytes) const;
   void SendPieces(const KeyframeId& id, Item* item, int64_t now_us, std::vector<Sent>* out);
