@@ -1,30 +1,8 @@
-// The files of a folder or zip that was dropped onto the page, by name.
-
-import { unzipSync } from "fflate";
+// The files of a folder that was dropped onto the page, by name.
 
 export interface Files {
   names: string[]; // with their folders: "walk/mav0/imu0/data.csv"
   read(name: string): Promise<Uint8Array>;
-}
-
-export async function filesOfZip(zip: Blob): Promise<Files> {
-  const bytes = new Uint8Array(await zip.arrayBuffer());
-  const names: string[] = [];
-  const listing = { filter: ({ name }: { name: string }) => (names.push(name), false) };
-  try {
-    unzipSync(bytes, listing);
-  } catch (error) {
-    throw new Error(`this zip cannot be read: ${(error as Error).message}`);
-  }
-  return {
-    names,
-    // Unpacks one file at a time, because all images together would not fit a phone's memory.
-    read: async (name) => {
-      const found = unzipSync(bytes, { filter: (file) => file.name === name })[name];
-      if (!found) throw new Error(`${name} is not in the zip`);
-      return found;
-    },
-  };
 }
 
 export function filesOf(byName: Map<string, Blob>): Files {

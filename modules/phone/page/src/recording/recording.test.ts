@@ -1,8 +1,9 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { isCalibrated, openRecording, withCamera } from "./euroc";
-import { filesOf, filesOfZip } from "./files";
+import { filesOf } from "./files";
 import { RecordingWriter } from "./writer";
+import { filesOfZip } from "./zip";
 
 const kCamera = `T_BS: {cols: 4, rows: 4, data: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}
 resolution: [640, 480]
