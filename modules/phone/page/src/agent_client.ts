@@ -10,14 +10,19 @@ const kLongestClose_ms = 3000; // longest wait for an agent that no longer answe
 
 type Image = Pick<CameraImage, "utime" | "luma" | "width" | "height" | "stride"> & { T_odom_body?: Pose7 | null };
 
-export class AgentClient {
-  private readonly worker = new Worker(new URL("./worker.ts", import.meta.url), { type: "module" });
+// A worker whose agent is closed. The next agent gets it, because a page without network cannot load the agent's program again.
+let idle: Worker | undefined;
 
-  private closed = () => {};
+export class AgentClient {
+  private readonly worker: Worker;
+  private hasFailed = false;
   private closing?: Promise<void>;
+  private closed = () => {};
 
   // `onMessage` gets at most one failure, and none after close().
   constructor(open: OpenAgent, private readonly onMessage: (message: FromWorker) => void) {
+    this.worker = idle ?? new Worker(new URL("./worker.ts", import.meta.url), { type: "module" });
+    idle = undefined;
     this.worker.onmessage = ({ data }: MessageEvent<FromWorker>) => this.take(data);
     this.worker.onerror = ({ message }) => this.take({ kind: "failed", text: message || "The agent's script cannot be loaded." });
     this.say(open);
@@ -33,8 +38,9 @@ export class AgentClient {
     this.say({ kind: "image", utime, luma, width, height, stride, T_odom_body }, [luma.buffer]);
   }
 
+  // Does nothing after close(): the worker may have another agent then.
   say(message: ToWorker, transfer: Transferable[] = []) {
-    this.worker.postMessage(message, transfer);
+    if (!this.closing) this.worker.postMessage(message, transfer);
   }
 
   // Resolves when all that is unsent is stored.
@@ -43,19 +49,22 @@ export class AgentClient {
   }
 
   private async end() {
-    const closed = new Promise<void>((done) => (this.closed = done));
+    const isClosed = new Promise<boolean>((done) => (this.closed = () => done(true)));
+    const isLate = new Promise<boolean>((done) => setTimeout(() => done(false), kLongestClose_ms));
     this.say({ kind: "close" });
-    await Promise.race([closed, new Promise((done) => setTimeout(done, kLongestClose_ms))]);
-    this.worker.terminate();
+    const mayServe = (await Promise.race([isClosed, isLate])) && !this.hasFailed && !idle;
+    if (mayServe) idle = this.worker;
+    else this.worker.terminate();
   }
 
   // An agent that has failed is closed at once, because it would fail again and again.
   private take(message: FromWorker) {
-    if (message.kind === "closed") return this.closed();
     if (message.kind === "failed") {
-      if (this.closing) return;
+      this.hasFailed = true;
+      if (this.closing) return this.closed();
       void this.close();
     }
+    if (message.kind === "closed") return this.closed();
     this.onMessage(message);
   }
 }

@@ -1,4 +1,4 @@
-// Runs the agent in a Web Worker: odometry, uplink, the WebSocket to the gateway, and the store of what waits for the server.
+// Runs one agent at a time in a Web Worker: odometry, uplink, the WebSocket to the gateway, and the store of what waits for the server.
 
 import { PhoneAgent } from "./agent/phone_agent";
 import type { PhoneEvents, NewAnchor, WasmModuleFactory } from "./agent/phone_agent";
@@ -14,6 +14,10 @@ const kAlone = 1; // id of an agent without membership, which nobody else sees
 const say = (message: FromWorker) => postMessage(message);
 const fail = (error: Error) => say({ kind: "failed", text: String(error.message ?? error) });
 const storageFailed = (error: unknown) => void say({ kind: "storage_failed", text: String(error) });
+// Loads the agent's program once, for all agents of this worker.
+let program: ReturnType<WasmModuleFactory> | undefined;
+const load: WasmModuleFactory = () => (program ??= import(/* @vite-ignore */ kModule).then((module: { default: WasmModuleFactory }) => module.default()));
+
 const now_us = () => Math.round(1000 * (performance.timeOrigin + performance.now()));
 
 class AgentHost {
@@ -28,8 +32,7 @@ class AgentHost {
   ) {}
 
   static async open({ membership, cameraYaml, imuYaml, vioOptionsYaml, openedUtime, devicePoses }: OpenAgent): Promise<AgentHost> {
-    const module: { default: WasmModuleFactory } = await import(/* @vite-ignore */ kModule);
-    const agent = await PhoneAgent.load(module.default, {
+    const agent = await PhoneAgent.load(load, {
       agent: membership?.agent ?? kAlone,
       keyHex: membership?.key ?? "",
       cameraYaml,
@@ -79,8 +82,11 @@ class AgentHost {
       this.take(this.agent.poll(now_us()));
     } finally {
       await this.stored;
-      say({ kind: "closed" });
     }
+    this.link?.close();
+    this.spool?.close();
+    this.agent.close();
+    say({ kind: "closed" });
   }
 
   private poll() {

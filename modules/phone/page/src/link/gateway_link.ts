@@ -34,6 +34,7 @@ export class GatewayLink {
   private proven = false;
   private openedAt = -Infinity; // ms
   private silence?: ReturnType<typeof setTimeout>;
+  private retry?: ReturnType<typeof setTimeout>;
 
   constructor(
     private readonly origin: string, // "wss://host:port"
@@ -51,6 +52,13 @@ export class GatewayLink {
     return true;
   }
 
+  // Ends the link for good.
+  close() {
+    clearTimeout(this.silence);
+    clearTimeout(this.retry);
+    this.giveUp();
+  }
+
   private connect() {
     this.proven = false;
     const socket = new WebSocket(`${this.origin}/link?agent=${this.agent}`);
@@ -58,22 +66,27 @@ export class GatewayLink {
     socket.binaryType = "arraybuffer";
     socket.onmessage = ({ data }: MessageEvent<ArrayBuffer>) => this.take(socket, new Uint8Array(data));
     socket.onclose = ({ code }) => this.lost(code);
-    this.listen(socket);
+    this.listen();
   }
 
   // Restarts the timer for silence. After it the socket is given up without waiting for it to close, which takes longer still in a
   // network that is gone.
-  private listen(socket: WebSocket) {
+  private listen() {
     clearTimeout(this.silence);
     this.silence = setTimeout(() => {
-      socket.onmessage = socket.onclose = null;
-      socket.close();
+      this.giveUp();
       this.lost();
     }, kSilent_ms);
   }
 
+  private giveUp() {
+    if (!this.socket) return;
+    this.socket.onmessage = this.socket.onclose = null;
+    this.socket.close();
+  }
+
   private take(socket: WebSocket, message: Uint8Array) {
-    this.listen(socket);
+    this.listen();
     if (this.proven) return this.onPacket(message);
     this.proven = true;
     void proofOf(this.keyHex, this.agent, message).then((proof) => {
@@ -90,7 +103,7 @@ export class GatewayLink {
     if (this.state === "open" && openFor_ms > kLongestRetry_ms) this.retry_ms = kFirstRetry_ms;
     this.state = kFinal.get(code) ?? "connecting";
     if (kFinal.has(code)) return;
-    setTimeout(() => this.connect(), this.retry_ms);
+    this.retry = setTimeout(() => this.connect(), this.retry_ms);
     this.retry_ms = Math.min(2 * this.retry_ms, kLongestRetry_ms);
   }
 }

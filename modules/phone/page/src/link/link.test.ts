@@ -78,3 +78,22 @@ test("a socket that says nothing for ten seconds is given up for a new one", asy
   mock.timers.reset();
   globalThis.WebSocket = realSocket;
 });
+
+test("a closed link opens no further socket and gives no packet", () => {
+  const realSocket = globalThis.WebSocket;
+  globalThis.WebSocket = FakeSocket as unknown as typeof WebSocket;
+  mock.timers.enable({ apis: ["setTimeout"] });
+  for (const isLost of [false, true]) {
+    FakeSocket.all = [];
+    const link = new GatewayLink("wss://server", 7, "ab".repeat(32), () => assert.fail("a packet"));
+    const [socket] = FakeSocket.all;
+    if (isLost) socket.onclose!({ code: 1006 });
+    link.close();
+    socket.says(32);
+    socket.says(50);
+    mock.timers.tick(60_000);
+    assert.equal(FakeSocket.all.length, 1);
+  }
+  mock.timers.reset();
+  globalThis.WebSocket = realSocket;
+});
