@@ -432,6 +432,28 @@ const leaveUnsent = (page, spool) => page.evaluate((name) => new Promise((done) 
   };
 }), spool);
 
+// Another tab, which the phone has suspended, holds the storage of an earlier agent.
+async function testOtherTab(browser, url) {
+  const tab = await openPage(browser, url, kPhone);
+  await tab.evaluate(() => new Promise((done) => {
+    const open = indexedDB.open("pangea.spool.2", 1);
+    open.onsuccess = () => done(void (window.held = open.result));
+  }));
+  const page = await tab.context().newPage();
+  await page.goto(`${url}#join=JKMN-PQRS`);
+  await page.route("**/v1/join", (route) => route.fulfill({ json: { agent: 2, key: "ab".repeat(32), site: "hall" } }));
+  await senseMotion(page);
+  await page.locator("#start").click();
+  await becomes(page, "whoever joins keeps the key, before another tab lets go of the storage", () =>
+    localStorage.getItem("pangea.membership") !== null && !pangea.calibration);
+  await page.locator("#skip").click();
+  await becomes(page, "and is told that the storage is held", () =>
+    /does not keep what is unsent: .*another tab/.test(document.getElementById("notice").textContent));
+  await becomes(page, "and walks", () => pangea.walk?.vio?.counters.images > 2);
+  await tab.close();
+  await stopAndClose(page);
+}
+
 async function testLeaving(browser, url) {
   const page = await openPage(browser, url, kPhone);
   await page.evaluate((key) => localStorage.setItem("pangea.membership", JSON.stringify({ agent: 2, key, site: "hall", name: "Anna" })), "ab".repeat(32));
@@ -468,6 +490,7 @@ await run(async () => {
   await testJoining(browser, url);
   await testUpload(browser, url);
   await testMembers(browser, url);
+  await testOtherTab(browser, url);
   await testLeaving(browser, url);
   await testPlaying(browser, url, zip);
   await testUncalibrated(browser, url, zip);

@@ -104,3 +104,16 @@ test("all are removed, also one that is open", async () => {
   for (const agent of [7, 8]) assert.deepEqual(await ids(await SpoolStore.open(spoolOf(agent))), []);
   await assert.rejects(one.apply([put("3", 3)]));
 });
+
+test("a tab that does not let go is waited for, but not for ever", async () => {
+  const held = await new Promise<IDBDatabase>((resolve) => {
+    const request = indexedDB.open(spoolOf(9), 1);
+    request.onupgradeneeded = () => request.result.createObjectStore("keyframes", { keyPath: "id" });
+    request.onsuccess = () => resolve(request.result);
+  });
+  await assert.rejects(SpoolStore.removeAll(), /another tab/);
+  await assert.rejects(SpoolStore.open(spoolOf(9)), /another tab/);
+  held.close();
+  assert.deepEqual(await ids(await SpoolStore.open(spoolOf(9))), []);
+  await SpoolStore.removeAll();
+});

@@ -6,6 +6,7 @@ import type { SpoolChange } from "./phone_agent";
 const kStore = "keyframes";
 const kPrefix = "pangea.spool.";
 const kReopenPauses_ms = [0, 300, 1000]; // before each attempt; together less than the page waits for an agent to close
+const kLongest_ms = 3000; // longest wait for another tab, which a phone may have suspended
 
 export const spoolOf = (agent: number) => `${kPrefix}${agent}`;
 
@@ -14,6 +15,18 @@ const done = <T>(request: IDBRequest<T>) =>
     request.onsuccess = () => resolve(request.result);
     request.onerror = () => reject(request.error);
   });
+
+// For a database that is opened or removed, which waits until other tabs have closed it. If it is opened too late, it is closed again.
+function inTime(request: IDBOpenDBRequest): Promise<IDBDatabase> {
+  let timer: ReturnType<typeof setTimeout>;
+  const isLate = new Promise<never>((_, reject) => {
+    timer = setTimeout(() => {
+      reject(new Error("another tab of this page holds it"));
+      request.onsuccess = () => request.result?.close();
+    }, kLongest_ms);
+  });
+  return Promise.race([done(request), isLate]).finally(() => clearTimeout(timer));
+}
 
 interface Entry {
   id: string;
@@ -46,7 +59,7 @@ export class SpoolStore {
   // Removes the spools of all agents. Changes of one that is open fail from then on.
   static async removeAll() {
     const names = (await indexedDB.databases()).map(({ name }) => name ?? "").filter((name) => name.startsWith(kPrefix));
-    await Promise.all(names.map((name) => done(indexedDB.deleteDatabase(name))));
+    await Promise.all(names.map((name) => inTime(indexedDB.deleteDatabase(name))));
   }
 
   static async countOf(name: string): Promise<number> {
@@ -146,5 +159,5 @@ export class SpoolStore {
 function connect(name: string): Promise<IDBDatabase> {
   const request = indexedDB.open(name, 1);
   request.onupgradeneeded = () => request.result.createObjectStore(kStore, { keyPath: "id" });
-  return done(request);
+  return inTime(request);
 }

@@ -47,9 +47,9 @@ export class Welcome {
     if (code === "") return;
     try {
       this.membership = await join(code, byId<HTMLInputElement>("name").value.trim());
+      if (!keepMembership(this.membership)) notice("This browser does not keep your key: it is lost when you close the page.");
       // The keyframes of an earlier agent cannot be sent without its key; another site may have given the same id.
       await SpoolStore.removeAll().catch(() => {});
-      if (!keepMembership(this.membership)) notice("This browser does not keep your key: it is lost when you close the page.");
     } catch (error) {
       // A member who scans the code of the invite once more.
       if (!(error instanceof CodeRefused) || !this.membership) throw error;
