@@ -146,8 +146,8 @@ void AddArguments(CLI::App& app, GatewayArguments* arguments) {
   app.add_option("--port", arguments->web.port, "TCP port; 0 for a free one")
       ->capture_default_str();
   app.add_option("--host", arguments->hosts,
-                 "a name of this machine by which browsers may ask; the first is in the link that "
-                 "`invite` prints; repeatable");
+                 "a name or address by which browsers reach this machine; the first is in the link "
+                 "that `invite` prints; repeatable");
   app.add_option("--cert", arguments->certificate,
                  "your own certificate and those that vouch for it (PEM), in place of the "
                  "gateway's own authority");

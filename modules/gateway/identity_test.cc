@@ -15,6 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using testing::Contains;
+using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::UnorderedElementsAre;
@@ -173,6 +174,16 @@ TEST(MachineNames, AreThoseOfThisMachine) {
   EXPECT_THAT(names.hosts, Contains("localhost"));
   EXPECT_THAT(names.addresses, Contains("127.0.0.1"));
   EXPECT_THAT(names.addresses, Contains(AddressForOthers(names)));
+}
+
+// Browsers look for an address among the certificate's addresses, not among its names.
+TEST(MachineNames, AnAddressThatTheUserGivesIsNoName) {
+  MachineNames names;
+  for (const char* host : {"hall.example.org", "192.168.77.7", "fd00::9"}) {
+    AddTo(&names, host);
+  }
+  EXPECT_THAT(names.hosts, ElementsAre("hall.example.org"));
+  EXPECT_THAT(names.addresses, ElementsAre("192.168.77.7", "fd00::9"));
 }
 
 }  // namespace

@@ -75,6 +75,13 @@ MachineNames NamesOfThisMachine() {
   return names;
 }
 
+void AddTo(MachineNames* names, const std::string& host) {
+  std::array<unsigned char, sizeof(in6_addr)> bytes{};
+  const bool is_address = inet_pton(AF_INET, host.c_str(), bytes.data()) == 1 ||
+                          inet_pton(AF_INET6, host.c_str(), bytes.data()) == 1;
+  (is_address ? names->addresses : names->hosts).push_back(host);
+}
+
 std::string AddressForOthers(const MachineNames& names) {
   if (std::string address = AddressOfRouteOut(); !address.empty()) {
     return address;

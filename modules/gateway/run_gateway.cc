@@ -87,7 +87,9 @@ void RunGateway(const GatewayArguments& arguments) {
   buses.link = arguments.link.empty() ? buses.link : arguments.link;
   buses.bus = arguments.bus.empty() ? buses.bus : arguments.bus;
   MachineNames names = NamesOfThisMachine();
-  names.hosts.insert(names.hosts.end(), arguments.hosts.begin(), arguments.hosts.end());
+  for (const std::string& host : arguments.hosts) {
+    AddTo(&names, host);
+  }
   LcmBus link_bus(buses.link, LcmBus::Fragments::kRefused);
   LcmBus server_bus(buses.bus);
   MakeGatewayFolders(site);
