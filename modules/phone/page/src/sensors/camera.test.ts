@@ -3,12 +3,12 @@ import { test } from "node:test";
 import { Camera } from "./camera";
 
 // A browser whose camera is allowed, and whose video does as it is told.
-function installBrowser(play: () => Promise<void>) {
+function installBrowser(play: () => Promise<void>, video: object = { requestVideoFrameCallback: () => 0 }) {
   const track = { label: "back", readyState: "live", stop: () => (track.readyState = "ended"), addEventListener: () => {} };
   const stream = { getTracks: () => [track], getVideoTracks: () => [track] };
   const globals = {
     navigator: { mediaDevices: { getUserMedia: async () => stream } },
-    document: { createElement: () => ({ play, requestVideoFrameCallback: () => 0 }) },
+    document: { createElement: () => ({ play, ...video }) },
     window: {},
   };
   for (const [name, value] of Object.entries(globals)) Object.defineProperty(globalThis, name, { value, configurable: true });
@@ -21,6 +21,9 @@ test("a camera that gives no video is not left open", async () => {
   });
   await assert.rejects(Camera.open(), /interrupted/);
   assert.equal(track.readyState, "ended");
+  const ofOldBrowser = installBrowser(async () => {}, {});
+  await assert.rejects(Camera.open(), /requestVideoFrameCallback/);
+  assert.equal(ofOldBrowser.readyState, "ended");
 });
 
 test("each image of the camera is closed, those that come after its end too", async () => {

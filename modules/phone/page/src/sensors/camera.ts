@@ -2,12 +2,11 @@
 
 import type { CameraKind } from "./calibration";
 import { ArrivalClock, utimeOf } from "./clock";
-import { imageOfFrame } from "./luma";
-import type { Luma } from "./luma";
+import { imageOfFrame, imageOfVideo } from "./luma";
+import type { Picture } from "./luma";
 
-export interface CameraImage extends Luma {
+export interface CameraImage extends Picture {
   utime: number; // us
-  picture: ImageBitmap; // for drawing; whoever has the image must close it
 }
 
 const kSettle_ms = 1500; // time for focus and exposure to settle before they are locked
@@ -47,13 +46,13 @@ export class Camera {
     const camera = new Camera(stream, video);
     try {
       await video.play();
+      if ("MediaStreamTrackProcessor" in window) void camera.readTrack();
+      else camera.readVideo();
     } catch (error) {
       camera.stop();
       throw error;
     }
     setTimeout(() => void camera.lock(), kSettle_ms);
-    if ("MediaStreamTrackProcessor" in window) void camera.readTrack();
-    else camera.readVideo();
     return camera;
   }
 
@@ -90,38 +89,38 @@ export class Camera {
       if (done) return;
       const utime = this.stopped ? undefined : clock.map(frame.timestamp, utimeOf(performance.now()));
       if (utime === undefined) frame.close();
-      else await this.give(utime, () => frame);
+      else await this.give(utime, () => imageOf(frame));
     }
   }
 
-  // For Safari and Firefox. captureTime is when the camera took the image; without it, the time of presentation is used.
+  // For Safari and Firefox, which has no VideoFrame on Android. captureTime is when the camera took the image; without it, the time of
+  // presentation is used.
   private readVideo() {
+    const read = () => ("VideoFrame" in window ? imageOf(new VideoFrame(this.video)) : imageOfVideo(this.video));
     let newest = 0;
     const next = async (now: number, { captureTime }: VideoFrameCallbackMetadata) => {
       if (this.stopped) return;
       const utime = utimeOf(captureTime ?? now);
       if (utime > newest) {
         newest = utime;
-        await this.give(utime, () => new VideoFrame(this.video));
+        await this.give(utime, read);
       }
       this.video.requestVideoFrameCallback(next);
     };
     this.video.requestVideoFrameCallback(next);
   }
 
-  // A frame that cannot be read is left out, because the next one may be good.
-  private async give(utime: number, open: () => VideoFrame) {
+  // An image that cannot be read is left out, because the next one may be good.
+  private async give(utime: number, read: () => Promise<Picture>) {
     try {
-      await this.giveFrame(utime, open());
+      const image = await read();
+      if (this.onImage && !this.stopped) this.onImage({ utime, ...image });
+      else image.picture.close();
     } catch (error) {
       console.info(`An image of the camera was left out: ${error}`);
     }
   }
-
-  // The frame is returned to the camera at once, because the camera has only few frames and stops when all are kept.
-  private async giveFrame(utime: number, frame: VideoFrame) {
-    const image = await imageOfFrame(frame).finally(() => frame.close());
-    if (this.onImage && !this.stopped) this.onImage({ utime, ...image });
-    else image.picture.close();
-  }
 }
+
+// The frame is returned to the camera at once, because the camera has only few frames and stops when all are kept.
+const imageOf = (frame: VideoFrame): Promise<Picture> => imageOfFrame(frame).finally(() => frame.close());

@@ -7,6 +7,10 @@ export interface Luma {
   stride: number; // bytes per row
 }
 
+export interface Picture extends Luma {
+  picture: ImageBitmap; // for drawing; whoever has it must close it
+}
+
 const kPlanar = ["I420", "I420A", "NV12", "I422", "I444"]; // the first plane is the luma
 
 // Whether the frame is displayed rotated or flipped, as those of a phone's camera that is built in sideways. TypeScript's library lacks
@@ -17,13 +21,14 @@ function isRotated(frame: VideoFrame & { rotation?: number; flip?: boolean }): b
 }
 
 // The frame as it is displayed. Only drawing rotates it: copyTo and (in Chromium) createImageBitmap leave its pixels as they lie.
-export async function imageOfFrame(frame: VideoFrame): Promise<Luma & { picture: ImageBitmap }> {
-  if (isRotated(frame)) {
-    const context = drawn(frame, frame.displayWidth, frame.displayHeight);
-    return { ...lumaOfDrawn(context), picture: context.canvas.transferToImageBitmap() };
-  }
+export async function imageOfFrame(frame: VideoFrame): Promise<Picture> {
+  if (isRotated(frame)) return imageOfDrawn(drawn(frame, frame.displayWidth, frame.displayHeight));
   const [luma, picture] = await Promise.all([lumaOfFrame(frame), createImageBitmap(frame)]);
   return { ...luma, picture };
+}
+
+export async function imageOfVideo(video: HTMLVideoElement): Promise<Picture> {
+  return imageOfDrawn(drawn(video, video.videoWidth, video.videoHeight));
 }
 
 // Needs no canvas if the frame has a luma plane.
@@ -41,6 +46,10 @@ function drawn(picture: CanvasImageSource, width: number, height: number): Offsc
   const context = new OffscreenCanvas(width, height).getContext("2d", { willReadFrequently: true })!;
   context.drawImage(picture, 0, 0, width, height);
   return context;
+}
+
+function imageOfDrawn(context: OffscreenCanvasRenderingContext2D): Picture {
+  return { ...lumaOfDrawn(context), picture: context.canvas.transferToImageBitmap() };
 }
 
 function lumaOfDrawn(context: OffscreenCanvasRenderingContext2D): Luma {
