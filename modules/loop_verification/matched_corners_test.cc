@@ -113,7 +113,7 @@ TEST_F(MatchedCorners, AKeptWindowIsThatOfItsKeyframes) {
       const KeyframeId& id = agent_.keyframes[seq].id;
       const KeyframeWindow frames = store_.WindowUpTo(id, 5);
       for (const KeyframeWindow& after : {KeyframeWindow{}, store_.WindowBehind(id, 4)}) {
-        EXPECT_EQ(sums(cache.Make(frames, {}, after)), sums(MakeWindow(frames, {}, after)));
+        EXPECT_EQ(sums(*cache.Make(frames, {}, after)), sums(MakeWindow(frames, {}, after)));
       }
     }
   }

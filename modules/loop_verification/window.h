@@ -91,8 +91,9 @@ Window MakeWindow(KeyframeWindow frames, const WindowOptions& options,
 enum class Direction { kForward, kReverse };
 inline constexpr Direction kBothDirections[] = {Direction::kForward, Direction::kReverse};
 
+// Two windows that outlive the pair.
 struct WindowPair {
-  Window m, c;  // m: up to the candidate's match; c: up to the query
+  const Window &m, &c;  // m: up to the candidate's match; c: up to the query
 
   // The window that holds the point, and the window whose camera observes it.
   const Window& Holder(Direction direction) const {

@@ -15,15 +15,15 @@ namespace pangea {
 class WindowCache {
  public:
   // Like MakeWindow; all calls must have the same options.
-  Window Make(const KeyframeWindow& frames, const WindowOptions& options,
-              const KeyframeWindow& after = {}) {
+  std::shared_ptr<const Window> Make(const KeyframeWindow& frames, const WindowOptions& options,
+                                     const KeyframeWindow& after = {}) {
     const std::pair key(frames, after);
     auto window = windows_.Find(key);
     if (window == nullptr) {
       window = std::make_shared<const Window>(MakeWindow(frames, options, after));
       windows_.Add(key, window);
     }
-    return *window;
+    return window;
   }
 
  private:

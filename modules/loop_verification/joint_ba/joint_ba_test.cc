@@ -107,10 +107,10 @@ TEST_F(JointBaTest, MapsThatAreNotMetricDoubtTheDistance) {
   constexpr double kSigma = 0.3;
   const auto relative_sigma = [&](bool m_is_metric) {
     KeyframeStore store;
-    WindowPair windows;
+    Window m, c;
     for (const auto& [window, map, is_metric] :
-         {std::tuple(&windows.m, MapId{1, 1000}, m_is_metric),
-          std::tuple(&windows.c, MapId{2, 2000}, false)}) {
+         {std::tuple(&m, MapId{1, 1000}, m_is_metric),
+          std::tuple(&c, MapId{2, 2000}, false)}) {
       for (const auto& said : store_.WindowUpTo({map, 5}, 5)) {
         Keyframe keyframe = said->keyframe();
         keyframe.scale_sigma = is_metric ? 0 : kSigma;
@@ -118,7 +118,7 @@ TEST_F(JointBaTest, MapsThatAreNotMetricDoubtTheDistance) {
       }
       *window = MakeWindow(store.WindowUpTo({map, 5}, 5), {});
     }
-    const auto result = SolveJointBa(windows, matches_, T_m_c_, options_);
+    const auto result = SolveJointBa({m, c}, matches_, T_m_c_, options_);
     EXPECT_TRUE(result);
     const Eigen::Vector3d& t = result->T_Km_Kc.t;
     return std::sqrt(t.dot(result->covariance.topLeftCorner<3, 3>() * t)) / t.squaredNorm();

@@ -30,10 +30,10 @@ class JointBaTestWindows : public testing::Test {
     }
     WindowOptions only_tracked;
     only_tracked.triangulation.few_landmarks = -1;
-    windows_.m = MakeWindow(store_.WindowUpTo({walk_m.map, 5}, 5), only_tracked);
-    windows_.c = MakeWindow(store_.WindowUpTo({walk_c.map, 5}, 5), only_tracked);
-    T_m_c_ = windows_.m.T_w_body.back() * agent_m.T_room_body[5].Inverse() *
-             agent_c.T_room_body[5] * windows_.c.T_w_body.back().Inverse();
+    m_ = MakeWindow(store_.WindowUpTo({walk_m.map, 5}, 5), only_tracked);
+    c_ = MakeWindow(store_.WindowUpTo({walk_c.map, 5}, 5), only_tracked);
+    T_m_c_ = m_.T_w_body.back() * agent_m.T_room_body[5].Inverse() *
+             agent_c.T_room_body[5] * c_.T_w_body.back().Inverse();
     for (const Direction direction : kBothDirections) {
       for (int frame = 0; frame < 5; ++frame) {
         const SearchResult found =
@@ -45,7 +45,8 @@ class JointBaTestWindows : public testing::Test {
   }
 
   KeyframeStore store_;
-  WindowPair windows_;
+  Window m_, c_;
+  WindowPair windows_{m_, c_};
   Rigid3 T_m_c_;
   std::vector<PointMatch> matches_;
   JointBaOptions options_;

@@ -19,8 +19,9 @@ Verification::Verification(const CommonStepOptions& options, const CandidateKeyf
       candidate(candidate),
       drift_gate(drift_gate),
       window_cache(*window_cache),
-      windows{window_cache->Make(LastOfWindow(keyframes.m), options.window, keyframes.after_m),
-              window_cache->Make(LastOfWindow(keyframes.c), options.window)} {}
+      window_m(window_cache->Make(LastOfWindow(keyframes.m), options.window, keyframes.after_m)),
+      window_c(window_cache->Make(LastOfWindow(keyframes.c), options.window)),
+      windows{*window_m, *window_c} {}
 
 bool Verification::AtLeast(std::string_view option, double value, double limit) {
   report.measured.push_back({step, option, value, true, limit});

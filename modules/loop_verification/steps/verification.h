@@ -2,6 +2,7 @@
 
 // The state of one candidate in the steps (steps.h): their common input and their results.
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -67,6 +68,7 @@ struct Verification {
   const PlaceCandidate& candidate;
   const std::optional<DriftGate>& drift_gate;  // only within one map
   WindowCache& window_cache;
+  std::shared_ptr<const Window> window_m, window_c;
   WindowPair windows;
   double guess_tilt_sigma = 0;  // radians, of roll and pitch between the windows
 
