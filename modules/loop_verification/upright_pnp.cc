@@ -30,7 +30,6 @@ struct Problem {
   const std::vector<RayPair>& ray_pairs;
   const Eigen::Vector3d& origin_c;
   const Eigen::Vector3d& origin_m;
-  std::vector<Eigen::Matrix3d> R_cam_w = {};  // by observation
 
   // Truncated quadratic score (MSAC). A ray pair constrains one dimension of two, so it counts
   // half. Returns some score up to `best` as soon as `best` cannot be exceeded.
@@ -41,7 +40,7 @@ struct Problem {
     auto reach = static_cast<double>(observations.size()) +
                  0.5 * static_cast<double>(ray_pairs.size()) + kRounding;
     for (size_t i = 0; i < observations.size() && score + reach > best; ++i, reach -= 1) {
-      const auto residual = Residual(observations[i], T_m_c, R_m_c, R_cam_w[i]);
+      const auto residual = Residual(observations[i], T_m_c, R_m_c);
       score += std::max(0.0, 1 - Chi2(residual, extra_var[i]) / kPnpMaxChi2);
     }
     const Eigen::Vector3d baseline = T_m_c * origin_c - origin_m;
@@ -172,12 +171,11 @@ std::optional<UprightPnpResult> SolveUprightPnp(const std::vector<PointObservati
                                                 const Eigen::Vector3d& origin_c,
                                                 const Eigen::Vector3d& origin_m, double tilt_sigma,
                                                 uint64_t seed) {
-  Problem problem{observations, ray_pairs, origin_c, origin_m};
+  const Problem problem{observations, ray_pairs, origin_c, origin_m};
   std::vector<double> tilt_var;
   for (const PointObservation& observation : observations) {
     const double tilt_sigmas = tilt_sigma * SigmaPerRadian(observation);
     tilt_var.push_back(tilt_sigmas * tilt_sigmas);
-    problem.R_cam_w.push_back(observation.T_cam_w.R());
   }
   const auto best = BestHypothesis(problem, tilt_var, seed);
   return best ? std::optional(Refined(problem, *best, tilt_var, tilt_sigma)) : std::nullopt;

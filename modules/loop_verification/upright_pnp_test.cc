@@ -54,6 +54,7 @@ Scene MakeScene(int count, int wrong, const Eigen::Vector2d& tilt, Random& rando
       PointObservation observation;
       observation.direction = direction;
       observation.T_cam_w = T_w_cam.Inverse();
+      observation.R_cam_w = observation.T_cam_w.R();
       const Eigen::Vector3d p_cam(Uniform(random, -2, 2), Uniform(random, -1.5, 1.5),
                                   Uniform(random, 3, 7));
       const Rigid3 T_holder_observer =

@@ -20,6 +20,7 @@ PointObservation MakeObservation(const WindowPair& windows, const PointMatch& ma
   observation.p_w = landmark.p_w;
   observation.depth_sigma_w = landmark.depth_sigma_w;
   observation.T_cam_w = observer.T_w_cam[match.observed.frame].Inverse();
+  observation.R_cam_w = observation.T_cam_w.R();
   observation.ray = view.ray(match.observed.corner);
   observation.sqrt_info = view.pixel_jacobian(match.observed.corner) /
                           CornerSigma(observer.corner(match.observed), pixel_sigma);
@@ -27,18 +28,13 @@ PointObservation MakeObservation(const WindowPair& windows, const PointMatch& ma
 }
 
 std::optional<WhitenedResidual> Residual(const PointObservation& observation, const Rigid3& T_m_c,
-                                         Eigen::Matrix<double, 2, 6>* J) {
-  return Residual(observation, T_m_c, T_m_c.R(), observation.T_cam_w.R(), J);
-}
-
-std::optional<WhitenedResidual> Residual(const PointObservation& observation, const Rigid3& T_m_c,
-                                         const Eigen::Matrix3d& R, const Eigen::Matrix3d& R_cam_w,
+                                         const Eigen::Matrix3d& R,
                                          Eigen::Matrix<double, 2, 6>* J) {
   const bool forward = observation.direction == Direction::kForward;
   // The point in the observing window: y = X^-1 p or X p.
   const Eigen::Vector3d y = forward ? Eigen::Vector3d(R.transpose() * (observation.p_w - T_m_c.t))
                                     : Eigen::Vector3d(R * observation.p_w + T_m_c.t);
-  const Eigen::Vector3d p_cam = R_cam_w * y + observation.T_cam_w.t;
+  const Eigen::Vector3d p_cam = observation.R_cam_w * y + observation.T_cam_w.t;
   if (p_cam.z() < kMinDepth) {
     return std::nullopt;
   }
@@ -46,7 +42,7 @@ std::optional<WhitenedResidual> Residual(const PointObservation& observation, co
   const Eigen::Vector2d xy = p_cam.head<2>() * inv_z;
   Eigen::Matrix<double, 2, 3> J_project;
   J_project << inv_z, 0, -xy.x() * inv_z, 0, inv_z, -xy.y() * inv_z;
-  const Eigen::Matrix<double, 2, 3> J_y = observation.sqrt_info * J_project * R_cam_w;
+  const Eigen::Matrix<double, 2, 3> J_y = observation.sqrt_info * J_project * observation.R_cam_w;
   const Eigen::Matrix3d R_observer_holder = forward ? Eigen::Matrix3d(R.transpose()) : R;
   if (J != nullptr) {
     // p' = p + dp, R' = Exp(dtheta) R: y' = R^T (p - t - dp - dtheta x (p - t)) or
@@ -82,9 +78,10 @@ PoseEstimate RefinePose(const std::vector<PointObservation>& observations, const
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     Matrix6d H = Matrix6d::Identity() * 1e-9;
     Vector6d b = Vector6d::Zero();
+    const Eigen::Matrix3d R_m_c = estimate.T_m_c.R();
     for (const PointObservation& observation : observations) {
       Eigen::Matrix<double, 2, 6> J;
-      const auto residual = Residual(observation, estimate.T_m_c, &J);
+      const auto residual = Residual(observation, estimate.T_m_c, R_m_c, &J);
       if (!residual) {
         continue;
       }

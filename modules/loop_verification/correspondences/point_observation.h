@@ -24,6 +24,7 @@ struct PointObservation {
   Eigen::Vector3d p_w;            // in the frame of the window that holds the point
   Eigen::Vector3d depth_sigma_w;  // displacement by one sigma of its depth
   Rigid3 T_cam_w;                 // the observing camera, in its own window
+  Eigen::Matrix3d R_cam_w;        // its rotation
   Eigen::Vector2d ray;
   Eigen::Matrix2d sqrt_info;  // whitens a difference of rays by the corner's pixel sigma
 };
@@ -33,19 +34,19 @@ PointObservation MakeObservation(const WindowPair& windows, const PointMatch& ma
 
 // The residual in sigmas of the pixel, and its change by one sigma of the point's depth. Empty if
 // the point is behind the camera. J, if not null: d(residual)/d(xi), with xi the perturbation of X
-// = T_m_c in the left frame (core/rigid3.h).
+// = T_m_c in the left frame (core/rigid3.h). R_m_c: the rotation of T_m_c.
 struct WhitenedResidual {
   Eigen::Vector2d r;
   Eigen::Vector2d depth_sigma;
 };
 std::optional<WhitenedResidual> Residual(const PointObservation& observation, const Rigid3& T_m_c,
-                                         Eigen::Matrix<double, 2, 6>* J = nullptr);
-
-// The same, with precomputed rotation matrices of T_m_c and of the observation's T_cam_w.
-std::optional<WhitenedResidual> Residual(const PointObservation& observation, const Rigid3& T_m_c,
                                          const Eigen::Matrix3d& R_m_c,
-                                         const Eigen::Matrix3d& R_cam_w,
                                          Eigen::Matrix<double, 2, 6>* J = nullptr);
+inline std::optional<WhitenedResidual> Residual(const PointObservation& observation,
+                                                const Rigid3& T_m_c,
+                                                Eigen::Matrix<double, 2, 6>* J = nullptr) {
+  return Residual(observation, T_m_c, T_m_c.R(), J);
+}
 
 // Squared Mahalanobis distance, with the pixel noise, an additional variance `extra_var` (in
 // sigma^2), and the uncertainty of the depth. Infinite behind the camera.

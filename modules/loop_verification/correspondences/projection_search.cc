@@ -67,15 +67,18 @@ class ProjectionSearch {
                    const PoseEstimate& pose)
       : holder_(windows.Holder(direction)),
         view_(*windows.Observer(direction).frames[frame]),
-        T_w_cam_(windows.Observer(direction).T_w_cam[frame]),
+        p_w_cam_(windows.Observer(direction).T_w_cam[frame].t),
+        T_cam_w_(windows.Observer(direction).T_w_cam[frame].Inverse()),
+        R_cam_w_(windows.Observer(direction).T_w_cam[frame].R().transpose()),
         T_observer_holder_(ObserverFromHolder(direction, pose.T_m_c)),
+        R_c_m_(pose.T_m_c.R().transpose()),
         direction_(direction),
         pose_(pose) {}
 
   std::optional<Prediction> Predict(const WindowLandmark& landmark) const {
     const CameraModel& camera = view_.keyframe().camera;
     const Eigen::Vector3d y = T_observer_holder_ * landmark.p_w;
-    const Eigen::Vector3d p_cam = T_w_cam_.Inverse() * y;
+    const Eigen::Vector3d p_cam = T_cam_w_ * y;
     Eigen::Matrix<double, 2, 3> J_project;
     const auto pixel = camera.Project(p_cam, &J_project);
     if (!pixel || !camera.Contains(*pixel, kBorderPx) || p_cam.z() > kMaxDepth_m) {
@@ -88,7 +91,7 @@ class ProjectionSearch {
     }
     const bool comparable = angle < 0.6 * kMaxViewAngle && log_scale < 0.6 * max_log_scale &&
                             camera.Contains(*pixel, 2 * kBorderPx);
-    const Eigen::Matrix<double, 2, 3> J_y = J_project * T_w_cam_.R().transpose();
+    const Eigen::Matrix<double, 2, 3> J_y = J_project * R_cam_w_;
     return Prediction{*pixel, Covariance(landmark, J_y), comparable};
   }
 
@@ -105,7 +108,7 @@ class ProjectionSearch {
   // between them (radians), and the ratio of the distances.
   std::pair<double, double> ViewChange(const WindowLandmark& landmark,
                                        const Eigen::Vector3d& y) const {
-    const Eigen::Vector3d ray = y - T_w_cam_.t;
+    const Eigen::Vector3d ray = y - p_w_cam_;
     const Eigen::Vector3d host_ray =
         y - T_observer_holder_ * holder_.T_w_cam[landmark.host.frame].t;
     return {std::acos(std::clamp(ray.normalized().dot(host_ray.normalized()), -1.0, 1.0)),
@@ -117,8 +120,7 @@ class ProjectionSearch {
                              const Eigen::Matrix<double, 2, 3>& J_y) const {
     Eigen::Matrix<double, 2, 6> J_pose;
     if (direction_ == Direction::kForward) {
-      const Eigen::Matrix3d R_t = pose_.T_m_c.R().transpose();
-      J_pose << -J_y * R_t, J_y * R_t * Hat(landmark.p_w - pose_.T_m_c.t);
+      J_pose << -J_y * R_c_m_, J_y * R_c_m_ * Hat(landmark.p_w - pose_.T_m_c.t);
     } else {
       J_pose << J_y, -J_y * Hat(pose_.T_m_c.q * landmark.p_w);
     }
@@ -145,8 +147,11 @@ class ProjectionSearch {
 
   const Window& holder_;
   const KeyframeView& view_;
-  const Rigid3& T_w_cam_;
+  Eigen::Vector3d p_w_cam_;
+  Rigid3 T_cam_w_;
+  Eigen::Matrix3d R_cam_w_;
   Rigid3 T_observer_holder_;
+  Eigen::Matrix3d R_c_m_;
   Direction direction_;
   const PoseEstimate& pose_;
 };

@@ -193,6 +193,7 @@ TEST(PointObservation, JacobianOfBothDirections) {
     PointObservation observation;
     observation.direction = run % 2 == 0 ? Direction::kForward : Direction::kReverse;
     observation.T_cam_w = UniformPose(random, 2, 1);
+    observation.R_cam_w = observation.T_cam_w.R();
     observation.ray = {0.1, 0.1};
     observation.sqrt_info << 400, 20, -10, 380;
     const Rigid3 T_m_c = UniformPose(random, 2, 1);
