@@ -249,6 +249,14 @@ void AnchorApi::Change(const web::WebRequest& request, const ListedAnchor& ancho
   edit.anchor = id;
   edit.name = NameOf(anchor.state);
   edit.payload = anchor.state.payload;
+  // An edit states the whole anchor: so also what a change that is under way will have changed.
+  const auto under_way = std::find_if(pending_.rbegin(), pending_.rend(), [&](const Pending& p) {
+    return p.edit.anchor == id && !p.edit.deleted;
+  });
+  if (under_way != pending_.rend()) {
+    edit.name = under_way->edit.name;
+    edit.payload = under_way->edit.payload;
+  }
   edit.deleted = request.method == "DELETE";
   std::optional<int64_t> known;
   if (edit.deleted && !request.body.empty()) {

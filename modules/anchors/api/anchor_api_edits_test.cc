@@ -108,6 +108,21 @@ TEST_F(AnchorApiTest, TwoChangesAtOnceHaveTwoRevisions) {
   EXPECT_EQ(Get(target).body["name"], "second");
 }
 
+// Each keeps what the other one changes.
+TEST_F(AnchorApiTest, TwoChangesAtOnceOfDifferentFieldsBothCount) {
+  const std::string target = "/v1/anchors/" + Make()["id"].get<std::string>();
+  const auto renamed = Ask("PUT", target, R"({"name": "pot"})");
+  const AnchorEdit rename = requested_.back();
+  const auto filled = Ask("PUT", target, R"({"payload": "full"})");
+  Journal(rename);
+  JournalNewest();
+  EXPECT_EQ(renamed->status, 200);
+  EXPECT_EQ(filled->status, 200);
+  const json anchor = Get(target).body;
+  EXPECT_EQ(anchor["name"], "pot");
+  EXPECT_EQ(anchor["payload"], "full");
+}
+
 TEST_F(AnchorApiTest, AChangeThatTheJournalNeverHadLocksNobodyOut) {
   const std::string target = "/v1/anchors/" + Make()["id"].get<std::string>();
   const auto lost = Ask("PUT", target, R"({"name": "lost"})");
