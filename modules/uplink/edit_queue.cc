@@ -21,7 +21,8 @@ void TakePlace(const AnchorEdit& older, AnchorEdit* newer) {
 EditQueue::Taken EditQueue::Add(AnchorEdit edit) {
   const auto older = edits_.find(edit.anchor);
   if (older != edits_.end()) {
-    if (edit.revision <= older->second.revision) {
+    // A deletion is final, and must reach the server.
+    if (edit.revision <= older->second.revision || older->second.deleted) {
       return Taken::kOutdated;
     }
     if (edit.placement == AnchorEdit::Placement::kSame) {

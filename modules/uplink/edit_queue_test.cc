@@ -60,6 +60,16 @@ TEST(EditQueue, WhatReplacesAnEditKeepsItsPlace) {
   EXPECT_EQ(sent->utime, 77);
 }
 
+// Another app on the agent's bus has not heard of the deletion.
+TEST(EditQueue, NothingReplacesADeletion) {
+  EditQueue queue(kPlenty);
+  AnchorEdit deleted = TestEdit(kA, 2, 1);
+  deleted.deleted = true;
+  queue.Add(deleted);
+  EXPECT_EQ(queue.Add(TestEdit(kA, 3, 1)), EditQueue::Taken::kOutdated);
+  EXPECT_TRUE(queue.Next(0)->deleted);
+}
+
 TEST(EditQueue, IsBounded) {
   EditQueue queue(kPlenty);
   for (int i = 0; i < static_cast<int>(EditQueue::kMaxEdits); ++i) {
