@@ -12,6 +12,14 @@ constexpr double kRotationSpeed = 0.2;            // rad/s
 // Less than 3 s, because a step always counts as 50 ms, even if Poll was called a little later.
 constexpr double kWay_s = 2.7;
 
+// More than a correction that the server does not send at once (kAnchorMoved_m).
+constexpr double kMovedByPeople_m = 0.005, kMovedByPeople_rad = 0.005;
+
+bool HaveMoved(const Rigid3& before, const Rigid3& now) {
+  const Vector6d way = now.Minus(before);
+  return way.head<3>().norm() > kMovedByPeople_m || way.tail<3>().norm() > kMovedByPeople_rad;
+}
+
 bool Same(const Rigid3& a, const Rigid3& b) { return a.t == b.t && a.q.coeffs() == b.q.coeffs(); }
 
 }  // namespace
@@ -23,11 +31,15 @@ void ShownAnchorsBlend::Set(const AnchorState& state) {
   }
   const auto [it, is_new] = anchors_.try_emplace(state.anchor);
   Entry& entry = it->second;
-  const bool jumps = is_new || entry.map != state.map || entry.revision != state.revision ||
-                     entry.edited_by != state.edited_by;
-  if (jumps) {
-    entry = {state.revision,      state.edited_by,     state.map,
-             state.T_odom_anchor, state.T_odom_anchor, 0};
+  const bool edited = entry.revision != state.revision || entry.edited_by != state.edited_by;
+  changed_ = changed_ || edited;
+  entry.revision = state.revision;
+  entry.edited_by = state.edited_by;
+  if (is_new || entry.map != state.map ||
+      (edited && HaveMoved(entry.T_odom_anchor, state.T_odom_anchor))) {
+    entry.map = state.map;
+    entry.T_odom_anchor = entry.T_odom_shown = state.T_odom_anchor;
+    entry.speed = 0;
     changed_ = true;
   } else if (!Same(entry.T_odom_anchor, state.T_odom_anchor)) {
     entry.T_odom_anchor = state.T_odom_anchor;

@@ -7,7 +7,7 @@
 // A new anchor is shown at its pose at once. When its pose changes in the same map, the shown pose
 // follows at 0.1 m/s and 0.2 rad/s, or faster, up to 0.25 m/s, if it would take longer than 3 s.
 // However late Poll is called, one step is at most that of a twentieth of a second: 12.5 mm,
-// 10 mrad. An anchor that people have edited, or that is in another map now, is shown at its new
+// 10 mrad. An anchor that people have moved, or that is in another map now, is shown at its new
 // pose at once.
 //
 // A state machine: monotonic microseconds go in; no clock, no bus; not thread safe. The caller

@@ -162,6 +162,22 @@ TEST_F(Shown, WhatPeopleMovedMayJump) {
   EXPECT_EQ(ErrorTo({7, 2, 3}), 0);
 }
 
+TEST_F(Shown, AChangeOfItsNameOrPayloadIsNoJump) {
+  blend.OnPose(77, kMap);
+  blend.Set(At({1, 2, 3}));
+  Run(2);
+  blend.Set(At({1.5, 2, 3}));
+  Run(0.5);
+  AnchorState renamed = At({1.5015, 2, 3});
+  renamed.revision = 2;
+  blend.Set(renamed);
+  Run(0.1);
+  EXPECT_EQ(last->anchors.at(0).revision, 2);
+  EXPECT_LE(largest_step, kMaxStep);
+  Run(2.5, 4000);
+  EXPECT_EQ(ErrorTo({1.5015, 2, 3}), 0);
+}
+
 TEST_F(Shown, OnlyThoseOfTheAgentsMap) {
   blend.OnPose(77, kMap);
   blend.Set(At({1, 2, 3}));
