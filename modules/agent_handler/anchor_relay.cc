@@ -53,7 +53,7 @@ void AnchorRelay::OnAnchor(const std::string& channel, const anchor_t& message) 
   if (!state.value || state.value->map.agent_id != agent_id) {
     return node_.Refuse(state.value ? "anchor in another agent's map" : state.refused);
   }
-  if (!agent->second.table.Set(state.value->anchor, state.value->gone, EncodeMessage(message))) {
+  if (!agent->second.table.Set(*state.value, EncodeMessage(message))) {
     node_.Count("anchors_left_out");
     node_.Refuse(fmt::format("agent {} has {} anchors: no more are sent to it", agent_id,
                              AnchorTable::kMaxAnchors));

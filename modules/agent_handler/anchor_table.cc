@@ -5,19 +5,23 @@
 
 namespace pangea {
 
-bool AnchorTable::MakeRoom() {
-  const auto done = std::ranges::find_if(anchors_, [this](const auto& item) {
-    return item.second.gone && !unconfirmed_.contains(item.second.number);
+bool AnchorTable::MakeRoom(const MapId& map) {
+  const auto done = std::ranges::find_if(anchors_, [&](const auto& item) {
+    const Entry& entry = item.second;
+    return entry.map != map || (entry.gone && !unconfirmed_.contains(entry.number));
   });
   if (done == anchors_.end()) {
     return false;
   }
+  unconfirmed_.erase(done->second.number);
+  queue_.Remove(done->first);
   anchors_.erase(done);
   return true;
 }
 
-bool AnchorTable::Set(const AnchorId& id, bool gone, std::vector<uint8_t> message) {
-  if (!anchors_.contains(id) && anchors_.size() >= kMaxAnchors && !MakeRoom()) {
+bool AnchorTable::Set(const AnchorState& state, std::vector<uint8_t> message) {
+  const AnchorId& id = state.anchor;
+  if (!anchors_.contains(id) && anchors_.size() >= kMaxAnchors && !MakeRoom(state.map)) {
     return false;
   }
   Entry& entry = anchors_[id];
@@ -25,7 +29,7 @@ bool AnchorTable::Set(const AnchorId& id, bool gone, std::vector<uint8_t> messag
     return true;
   }
   unconfirmed_.erase(entry.number);
-  entry = {std::move(message), gone, ++last_number_};
+  entry = {std::move(message), state.map, state.gone, ++last_number_};
   unconfirmed_[entry.number] = id;
   queue_.Add(id);
   return true;

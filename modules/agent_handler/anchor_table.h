@@ -18,9 +18,9 @@ class AnchorTable {
  public:
   static constexpr size_t kMaxAnchors = 256;
 
-  // `message`: an encoded anchor_t; `gone`: its field of that name. False if there is no room. A
-  // gone anchor makes room for another one once the agent has confirmed that it is gone.
-  bool Set(const AnchorId& id, bool gone, std::vector<uint8_t> message);
+  // `message`: the state as an encoded anchor_t. False if there is no room. Room is made by anchors
+  // in other maps, which the agent has left, and by gone ones once the agent has confirmed that.
+  bool Set(const AnchorState& state, std::vector<uint8_t> message);
   // In a new session, all anchors are sent again.
   void OnNewSession();
   void OnReceived(const std::vector<int64_t>& numbers);
@@ -34,10 +34,11 @@ class AnchorTable {
  private:
   struct Entry {
     std::vector<uint8_t> message;
+    MapId map;
     bool gone = false;
     int64_t number = 0;
   };
-  bool MakeRoom();
+  bool MakeRoom(const MapId& map);
 
   std::map<AnchorId, Entry> anchors_;
   std::map<int64_t, AnchorId> unconfirmed_;  // by number

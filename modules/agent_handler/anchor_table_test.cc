@@ -11,14 +11,13 @@ namespace {
 constexpr AnchorId kA{2, 1}, kB{2, 2};
 constexpr MapId kAnchorMap{1, 1000};
 
-std::vector<uint8_t> Message(const AnchorId& id, int64_t revision, bool gone = false) {
-  AnchorState state = TestAnchor(id, revision, kAnchorMap);
-  state.gone = gone;
-  return EncodeMessage(ToMessage(state));
-}
-
 class AnchorTableTest : public testing::Test {
  protected:
+  bool Set(const AnchorId& id, int64_t revision, bool gone = false, const MapId& map = kAnchorMap) {
+    AnchorState state = TestAnchor(id, revision, map);
+    state.gone = gone;
+    return table.Set(state, EncodeMessage(ToMessage(state)));
+  }
   // The anchors that the table sends now.
   std::vector<LinkAnchor> Sent() {
     std::vector<LinkAnchor> sent;
@@ -32,7 +31,7 @@ class AnchorTableTest : public testing::Test {
 };
 
 TEST_F(AnchorTableTest, SendsUntilConfirmed) {
-  ASSERT_TRUE(table.Set(kA, false, Message(kA, 1)));
+  ASSERT_TRUE(Set(kA, 1));
   auto sent = Sent();
   ASSERT_EQ(sent.size(), 1u);
   EXPECT_EQ(sent[0].number, 1);
@@ -45,14 +44,14 @@ TEST_F(AnchorTableTest, SendsUntilConfirmed) {
   EXPECT_EQ(table.unconfirmed(), 0u);
   now += 10'000'000;
   EXPECT_TRUE(Sent().empty());
-  ASSERT_TRUE(table.Set(kA, false, Message(kA, 1)));
+  ASSERT_TRUE(Set(kA, 1));
   EXPECT_TRUE(Sent().empty()) << "nothing new";
 }
 
 TEST_F(AnchorTableTest, OnlyTheNewestStateIsSentAndConfirmed) {
-  table.Set(kA, false, Message(kA, 1));
+  Set(kA, 1);
   EXPECT_EQ(Sent().at(0).number, 1);
-  table.Set(kA, false, Message(kA, 2));
+  Set(kA, 2);
   const auto sent = Sent();
   ASSERT_EQ(sent.size(), 1u);
   EXPECT_EQ(sent[0].number, 2);
@@ -64,8 +63,8 @@ TEST_F(AnchorTableTest, OnlyTheNewestStateIsSentAndConfirmed) {
 }
 
 TEST_F(AnchorTableTest, AnotherSessionGetsAllAgain) {
-  table.Set(kA, false, Message(kA, 1));
-  table.Set(kB, false, Message(kB, 1));
+  Set(kA, 1);
+  Set(kB, 1);
   EXPECT_EQ(Sent().size(), 2u);
   table.OnReceived({1});
   table.OnNewSession();
@@ -76,14 +75,26 @@ TEST_F(AnchorTableTest, AnotherSessionGetsAllAgain) {
 
 TEST_F(AnchorTableTest, HoldsABoundedNumberOfAnchors) {
   for (int i = 0; i < static_cast<int>(AnchorTable::kMaxAnchors); ++i) {
-    ASSERT_TRUE(table.Set({2, i}, false, Message({2, i}, 1)));
+    ASSERT_TRUE(Set({2, i}, 1));
   }
-  EXPECT_FALSE(table.Set({3, 0}, false, Message({3, 0}, 1)));
-  EXPECT_TRUE(table.Set({2, 0}, true, Message({2, 0}, 2, true)));
-  EXPECT_FALSE(table.Set({3, 0}, false, Message({3, 0}, 1))) << "its agent does not know yet";
+  EXPECT_FALSE(Set({3, 0}, 1));
+  EXPECT_TRUE(Set({2, 0}, 2, true));
+  EXPECT_FALSE(Set({3, 0}, 1)) << "its agent does not know yet";
   table.OnReceived({static_cast<int64_t>(AnchorTable::kMaxAnchors) + 1});
-  EXPECT_TRUE(table.Set({3, 0}, false, Message({3, 0}, 1)));
+  EXPECT_TRUE(Set({3, 0}, 1));
   EXPECT_EQ(table.size(), AnchorTable::kMaxAnchors);
+}
+
+// A person's phone opens map after map, and hears of other anchors in each.
+TEST_F(AnchorTableTest, AnchorsOfAMapThatTheAgentHasLeftMakeRoom) {
+  for (int i = 0; i < static_cast<int>(AnchorTable::kMaxAnchors); ++i) {
+    ASSERT_TRUE(Set({2, i}, 1));
+  }
+  ASSERT_TRUE(Set({3, 0}, 1, false, {1, 2000}));
+  EXPECT_EQ(table.size(), AnchorTable::kMaxAnchors);
+  EXPECT_EQ(table.unconfirmed(), AnchorTable::kMaxAnchors);
+  table.OnNewSession();
+  EXPECT_EQ(table.unconfirmed(), AnchorTable::kMaxAnchors);
 }
 
 }  // namespace

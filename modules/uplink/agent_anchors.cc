@@ -10,22 +10,28 @@ constexpr int64_t kAgain_us = 10'000'000;
 
 }  // namespace
 
-std::optional<AnchorState> AgentAnchors::MakeRoomFor(const AnchorId& id) {
-  if (anchors_.contains(id) || anchors_.size() < kMaxAnchors) {
+std::optional<AnchorState> AgentAnchors::MakeRoomFor(const AnchorState& state) {
+  if (anchors_.contains(state.anchor) || anchors_.size() < kMaxAnchors) {
     return std::nullopt;
   }
-  auto found = std::find_if(anchors_.begin(), anchors_.end(),
-                            [](const auto& a) { return a.second.state.gone; });
-  if (found == anchors_.end()) {
-    found = std::find_if(anchors_.begin(), anchors_.end(),
-                         [](const auto& a) { return a.second.number == 0; });
-  }
-  if (found == anchors_.end()) {
+  constexpr int kInUse = 3;
+  const auto usefulness = [&](const auto& item) {
+    const Entry& entry = item.second;
+    if (entry.state.gone) {
+      return 0;
+    }
+    if (entry.state.map != state.map) {
+      return 1;
+    }
+    return entry.number == 0 ? 2 : kInUse;
+  };
+  const auto least = std::ranges::min_element(anchors_, {}, usefulness);
+  if (usefulness(*least) == kInUse) {
     return std::nullopt;
   }
-  AnchorState state = std::move(found->second.state);
-  anchors_.erase(found);
-  return state;
+  AnchorState left_out = std::move(least->second.state);
+  anchors_.erase(least);
+  return left_out;
 }
 
 AgentAnchors::Taken AgentAnchors::Take(const LinkAnchor& anchor, int64_t now_us) {

@@ -18,9 +18,9 @@ class AgentAnchors {
   static constexpr size_t kMaxAnchors = 256;
 
   // If there is no room for this anchor, removes another one and returns it: a gone one, or else
-  // one that the server has not sent in this session. Nothing if there is room, or none can be
-  // removed.
-  std::optional<AnchorState> MakeRoomFor(const AnchorId& id);
+  // one in another map, or one that the server has not sent in this session. Nothing if there is
+  // room, or none can be removed.
+  std::optional<AnchorState> MakeRoomFor(const AnchorState& state);
 
   enum class Taken { kNew, kKnown, kFull };
   // kNew: the caller must tell the apps. kFull: there is no room, and the state is not confirmed.

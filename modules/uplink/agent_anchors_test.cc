@@ -50,19 +50,30 @@ TEST(AgentAnchors, IsBounded) {
   }
   EXPECT_EQ(anchors.TakeReceived().size(), kMaxAnchorsReceived);
   const AnchorId another{2, 1};
-  EXPECT_FALSE(anchors.MakeRoomFor(another));
+  EXPECT_FALSE(anchors.MakeRoomFor(TestAnchor(another, 1, kMap)));
   EXPECT_EQ(anchors.Take(Anchor(++number, another), 0), AgentAnchors::Taken::kFull);
   EXPECT_TRUE(anchors.TakeReceived().empty()) << "what is not kept is not confirmed";
-  EXPECT_FALSE(anchors.MakeRoomFor({1, 3})) << "it has room";
+  EXPECT_FALSE(anchors.MakeRoomFor(TestAnchor({1, 3}, 1, kMap))) << "it has room";
   // Deleted anchors make room first, then anchors that only an earlier session has sent.
   LinkAnchor gone = Anchor(++number, {1, 7}, 2);
   gone.state.gone = true;
   EXPECT_EQ(anchors.Take(gone, 0), AgentAnchors::Taken::kNew);
-  EXPECT_EQ(anchors.MakeRoomFor(another)->anchor, (AnchorId{1, 7}));
+  EXPECT_EQ(anchors.MakeRoomFor(TestAnchor(another, 1, kMap))->anchor, (AnchorId{1, 7}));
   EXPECT_EQ(anchors.Take(Anchor(++number, another), 0), AgentAnchors::Taken::kNew);
   anchors.OnNewSession();
   anchors.Take(Anchor(1, {1, 0}), 0);
-  EXPECT_EQ(anchors.MakeRoomFor({3, 3})->anchor, (AnchorId{1, 1}));
+  EXPECT_EQ(anchors.MakeRoomFor(TestAnchor({3, 3}, 1, kMap))->anchor, (AnchorId{1, 1}));
+}
+
+TEST(AgentAnchors, AnchorsOfAnEarlierMapMakeRoom) {
+  AgentAnchors anchors;
+  int64_t number = 0;
+  for (int i = 0; i < static_cast<int>(AgentAnchors::kMaxAnchors); ++i) {
+    anchors.Take(Anchor(++number, {1, i}), 0);
+  }
+  const AnchorState later = TestAnchor({2, 1}, 1, kLaterMap);
+  EXPECT_TRUE(anchors.MakeRoomFor(later));
+  EXPECT_EQ(anchors.Take({++number, later}, 0), AgentAnchors::Taken::kNew);
 }
 
 }  // namespace

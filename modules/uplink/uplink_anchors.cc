@@ -138,7 +138,7 @@ void UplinkAnchors::OnAnchor(Bytes body, int64_t now_us) {
   if (!anchor.value) {
     return node_.Refuse(anchor.refused);
   }
-  if (auto left_out = anchors_.MakeRoomFor(anchor.value->state.anchor)) {
+  if (auto left_out = anchors_.MakeRoomFor(anchor.value->state)) {
     left_out->gone = true;
     Tell(*left_out);
     shown_.Erase(left_out->anchor);
