@@ -14,6 +14,9 @@ namespace {
 constexpr int kHolds = 8;  // maximum number of keyframes that hold an anchor
 constexpr size_t kMaxNotPlaced = 100;
 constexpr int kMaxCorrections = 3;
+// An anchor that an agent hears of stays near up to this multiple of the distance at which it came,
+// so that it does not come and go.
+constexpr double kStaysNear = 1.2;
 
 // Expresses the covariance of a transform in a rotated left frame.
 Matrix6d Rotated(const Eigen::Matrix3d& R, const Matrix6d& covariance) {
@@ -225,12 +228,14 @@ std::vector<AnchorId> Anchors::DeletedOf(const MapId& map) const {
   return deleted;
 }
 
-// The nearest of its group first.
+// The nearest of its group first; one that was told counts as nearer than it is.
 std::vector<AnchorId> Anchors::Near(const MapId& map, const Rigid3& T_odom_map,
-                                    const Eigen::Vector3d& p_odom_agent) const {
+                                    const Eigen::Vector3d& p_odom_agent,
+                                    const std::set<AnchorId>& told) const {
   std::vector<std::pair<double, AnchorId>> near;
   for (const auto& [id, position] : Positions()) {
-    const double away_m = (T_odom_map * position.T_map_anchor.t - p_odom_agent).norm();
+    const double away_m = (T_odom_map * position.T_map_anchor.t - p_odom_agent).norm() /
+                          (told.contains(id) ? kStaysNear : 1);
     if (away_m <= options_.near_m && !registry_.entries().at(id).deleted &&
         SameGroup(map, placements_.at(id).map)) {
       near.emplace_back(away_m, id);
@@ -257,7 +262,9 @@ std::vector<AnchorState> Anchors::ForAgent(const MapId& map, const std::set<Anch
   const Matrix6d frame_covariance = InverseCovariance(T_odom_map.Inverse(), correction_covariance);
   const Eigen::Vector3d p_odom_agent = track->second.keyframes().rbegin()->second.T_odom_body.t;
   std::vector<AnchorState> states;
-  for (const AnchorId& id : Near(map, T_odom_map, p_odom_agent)) {
+  std::set<AnchorId> untold = told;
+  for (const AnchorId& id : Near(map, T_odom_map, p_odom_agent, told)) {
+    untold.erase(id);
     const InGroup& position = Positions().at(id);
     AnchorState& state = states.emplace_back(Describe(id, map));
     state.T_odom_anchor = T_odom_map * position.T_map_anchor;
@@ -269,13 +276,11 @@ std::vector<AnchorState> Anchors::ForAgent(const MapId& map, const std::set<Anch
                           position.T_map_anchor, position.covariance);
   }
   for (const AnchorId& id : DeletedOf(map)) {
+    untold.erase(id);
     states.push_back(Describe(id, map));
   }
-  for (const AnchorId& id : told) {
-    if (const auto placement = placements_.find(id);
-        placement != placements_.end() && !SameGroup(map, placement->second.map)) {
-      states.emplace_back(Describe(id, map)).gone = true;
-    }
+  for (const AnchorId& id : untold) {
+    states.emplace_back(Describe(id, map)).gone = true;
   }
   return states;
 }

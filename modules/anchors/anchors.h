@@ -65,8 +65,8 @@ class Anchors {
   // The current map of each agent, or, if that has no keyframes yet, the one with the highest id.
   std::vector<MapId> AgentMaps() const;
   // The anchors near the map's newest keyframe, nearest first; then those that are gone for it:
-  // deleted ones (the newest max_near), and anchors in `told` that are no longer in its group.
-  // Empty for a map without keyframes.
+  // deleted ones (the newest max_near), and all others in `told`, which are deleted, not near any
+  // more, or no longer in its group. Empty for a map without keyframes.
   std::vector<AnchorState> ForAgent(const MapId& map, const std::set<AnchorId>& told = {}) const;
   // Every anchor with a place, in its group's frame; deleted ones too (AnchorState::gone).
   std::vector<AnchorState> All() const;
@@ -128,7 +128,8 @@ class Anchors {
   AnchorState Describe(const AnchorId& id, const MapId& map) const;
   std::vector<AnchorId> DeletedOf(const MapId& map) const;
   std::vector<AnchorId> Near(const MapId& map, const Rigid3& T_odom_map,
-                             const Eigen::Vector3d& p_odom_agent) const;
+                             const Eigen::Vector3d& p_odom_agent,
+                             const std::set<AnchorId>& told) const;
 
   const AnchorsOptions options_;
   const std::shared_ptr<RecordStore> records_;

@@ -164,6 +164,61 @@ TEST_F(AnchorsTest, OnlyTheNearestAreTold) {
   EXPECT_EQ(anchors.All().size(), 20u);
 }
 
+// An agent would show for ever what it is not told of any more: at a place that no correction of
+// the map reaches, and also after a deletion or an undone fusion.
+TEST_F(AnchorsTest, ThoseNoLongerNearAreGone) {
+  AnchorsOptions options;
+  options.near_m = 4;
+  Anchors anchors(options);
+  const AnchorEdit edit = Edit(0, 0);
+  const std::set<AnchorId> told = {edit.anchor};
+  anchors.Take(world_.agents[0].keyframes[0]);
+  anchors.Take(edit);
+  ASSERT_EQ(anchors.ForAgent(map(0)).size(), 1u);
+  const Eigen::Vector3d p_odom = anchors.ForAgent(map(0))[0].T_odom_anchor.t;
+  for (size_t i = 1; i < world_.agents[0].keyframes.size(); ++i) {
+    const Keyframe& keyframe = world_.agents[0].keyframes[i];
+    anchors.Take(keyframe);
+    const double away_m = (p_odom - keyframe.T_odom_body.t).norm();
+    const auto states = anchors.ForAgent(map(0), told);
+    ASSERT_EQ(states.size(), 1u) << away_m;
+    EXPECT_EQ(states[0].gone, away_m > 4.8) << away_m << " m; stays a little longer than it comes";
+    EXPECT_EQ(anchors.ForAgent(map(0)).size(), away_m > 4 ? 0u : 1u) << away_m;
+  }
+  EXPECT_TRUE(anchors.ForAgent(map(0), told)[0].gone);
+}
+
+TEST_F(AnchorsTest, AllThatWereToldAndAreDeletedAreGone) {
+  AnchorsOptions options;
+  options.max_near = 3;
+  Anchors anchors(options);
+  for (const Keyframe& keyframe : world_.agents[0].keyframes) {
+    anchors.Take(keyframe);
+  }
+  for (int seq = 0; seq < 20; ++seq) {
+    anchors.Take(Edit(0, seq));
+  }
+  std::set<AnchorId> told;
+  for (const AnchorState& state : anchors.ForAgent(map(0))) {
+    told.insert(state.anchor);
+  }
+  ASSERT_EQ(told.size(), 3u);
+  for (int seq = 0; seq < 20; ++seq) {
+    AnchorEdit deleted = Edit(0, seq);
+    deleted.revision = 2;
+    deleted.deleted = true;
+    anchors.Take(deleted);
+  }
+  std::set<AnchorId> gone;
+  for (const AnchorState& state : anchors.ForAgent(map(0), told)) {
+    EXPECT_TRUE(state.gone);
+    gone.insert(state.anchor);
+  }
+  for (const AnchorId& id : told) {
+    EXPECT_TRUE(gone.contains(id)) << ToString(id);
+  }
+}
+
 // A sample of a Gaussian with independent components.
 Vector6d Sample(const Vector6d& sigmas, std::mt19937_64& random) {
   std::normal_distribution<double> noise;

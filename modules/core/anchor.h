@@ -72,7 +72,7 @@ struct AnchorState {
   AnchorId anchor;
   int64_t revision = 0;
   int32_t edited_by = 0;
-  bool gone = false;  // deleted, or no longer in the group of `map`
+  bool gone = false;  // deleted, no longer near the agent, or no longer in the group of `map`
   std::string name;
   std::string payload;
   MapId map;  // an agent's map; or the group's oldest map, whose odom frame is the map frame
