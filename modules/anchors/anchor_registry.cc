@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <iterator>
+
 namespace pangea {
 namespace {
 
@@ -29,9 +32,14 @@ std::string AnchorRegistry::Take(const AnchorEdit& edit) {
     entry.name = edit.name;
     entry.payload = edit.payload;
   }
-  if (edit.placement != AnchorEdit::Placement::kSame &&
-      (!entry.place || OrderOf(edit) > OrderOf(*entry.place))) {
-    entry.place = edit;
+  if (edit.placement != AnchorEdit::Placement::kSame) {
+    entry.places.emplace(OrderOf(edit), edit);
+    const auto certain = std::find_if(
+        entry.places.rbegin(), entry.places.rend(),
+        [](const auto& place) { return place.second.placement != AnchorEdit::Placement::kPixel; });
+    if (certain != entry.places.rend()) {
+      entry.places.erase(entry.places.begin(), std::prev(certain.base()));
+    }
   }
   num_deleted_ += edit.deleted && !entry.deleted ? 1 : 0;
   entry.deleted |= edit.deleted;

@@ -3,12 +3,11 @@
 // Merges all edits into the state of each anchor; the result does not depend on their order.
 //
 // Name and payload come from the edit with the highest (revision, agent); the place from the
-// highest edit that has a placement. A deletion is final. An edit that the editor's key does not
-// allow is refused and changes nothing.
+// highest edit whose placement is possible. A deletion is final. An edit that the editor's key does
+// not allow is refused and changes nothing.
 
 #include <cstdint>
 #include <map>
-#include <optional>
 #include <string>
 #include <utility>
 
@@ -22,7 +21,9 @@ struct AnchorEntry {
   bool deleted = false;
   std::string name;
   std::string payload;
-  std::optional<AnchorEdit> place;  // the newest edit with a placement
+  // The edits with a placement that may count, by (revision, agent): the newest, and behind edits
+  // on a surface, which the map may not have there, also the next older one.
+  std::map<std::pair<int64_t, int32_t>, AnchorEdit> places;
 };
 
 class AnchorRegistry {

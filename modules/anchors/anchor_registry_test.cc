@@ -47,8 +47,8 @@ TEST(AnchorRegistry, TheOrderOfArrivalDoesNotMatter) {
     ASSERT_EQ(entry.name, "renamed at once");
     ASSERT_EQ(entry.revision, 3);
     ASSERT_EQ(entry.edited_by, 2);
-    ASSERT_EQ(entry.place->revision, 2);
-    ASSERT_EQ(entry.place->agent_id, 2);
+    ASSERT_EQ(entry.places.size(), 1u);
+    ASSERT_EQ(entry.places.begin()->first, (std::pair<int64_t, int32_t>{2, 2}));
   } while (std::ranges::next_permutation(order).found);
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <functional>
 #include <limits>
+#include <ranges>
 #include <tuple>
 #include <utility>
 
@@ -83,20 +84,33 @@ void Anchors::MakeExact(AnchorEdit* edit) const {
   }
 }
 
-// If the new placement fails, the anchor keeps its old one.
+// The newest edit that can be placed counts, in whatever order edits and keyframes come: while it
+// waits for a keyframe, or if its placement fails, an older one does.
 void Anchors::PlaceOrWait(const AnchorId& id) {
-  const AnchorEdit& edit = *registry_.entries().at(id).place;
-  PlacementResult result = Try(edit);
-  if (auto* const placement = std::get_if<AnchorPlacement>(&result)) {
-    placements_[id] = std::move(*placement);
-    positions_.reset();
-  } else if (const auto* const not_placed = std::get_if<NotPlaced>(&result)) {
-    if (not_placed_.size() < kMaxNotPlaced) {
-      not_placed_.push_back(
-          fmt::format("anchor {} \"{}\": {}", ToString(id), edit.name, not_placed->reason));
+  Tries& tries = tries_[id];
+  for (const auto& [order, edit] : std::views::reverse(registry_.entries().at(id).places)) {
+    if (order <= tries.placed) {
+      return;
     }
-  } else {
-    waiting_[edit.map].insert(id);
+    if (tries.failed.contains(order)) {
+      continue;
+    }
+    PlacementResult result = Try(edit);
+    if (auto* const placement = std::get_if<AnchorPlacement>(&result)) {
+      placements_[id] = std::move(*placement);
+      tries.placed = order;
+      positions_.reset();
+      return;
+    }
+    if (const auto* const not_placed = std::get_if<NotPlaced>(&result)) {
+      tries.failed.insert(order);
+      if (not_placed_.size() < kMaxNotPlaced) {
+        not_placed_.push_back(
+            fmt::format("anchor {} \"{}\": {}", ToString(id), edit.name, not_placed->reason));
+      }
+    } else {
+      waiting_[edit.map].insert(id);
+    }
   }
 }
 

@@ -116,6 +116,12 @@ class Anchors {
     Matrix6d covariance;
   };
 
+  // An anchor's edits, by (revision, agent).
+  struct Tries {
+    std::pair<int64_t, int32_t> placed{0, 0};
+    std::set<std::pair<int64_t, int32_t>> failed;
+  };
+
   // The anchor's pose in its group's frame with the placement of Try; empty if there is none.
   std::optional<Rigid3> TryInGroup(const AnchorEdit& edit) const;
   void PlaceOrWait(const AnchorId& id);
@@ -136,6 +142,7 @@ class Anchors {
   AnchorRegistry registry_;
   std::map<MapId, OdometryTrack> tracks_;
   std::map<AnchorId, AnchorPlacement> placements_;
+  std::map<AnchorId, Tries> tries_;
   std::map<MapId, std::set<AnchorId>> waiting_;  // by map: anchors that wait for a keyframe
   GroupStates<PosedGroup> groups_;
   std::map<MapId, Correction> corrections_;

@@ -132,6 +132,37 @@ TEST_F(AnchorsTest, WaitsForItsKeyframe) {
   EXPECT_EQ(anchors.ForAgent(map(0)).size(), 1u);
 }
 
+// After a restart all edits may come before the keyframes.
+TEST_F(AnchorsTest, AMoveThatFailsLeavesItWhereItWasInAnyOrder) {
+  const AnchorEdit made = Edit(0, 5);
+  AnchorEdit moved = made;
+  moved.revision = 2;
+  moved.placement = Placement::kPixel;
+  moved.utime = world_.agents[0].keyframes[10].utime;
+  moved.pixel = {300, 200};  // the world has no corners, so there is no surface
+  for (const bool edits_first : {false, true}) {
+    Anchors anchors{AnchorsOptions()};
+    if (edits_first) {
+      anchors.Take(made);
+      anchors.Take(moved);
+    }
+    for (const Keyframe& keyframe : world_.agents[0].keyframes) {
+      anchors.Take(keyframe);
+    }
+    if (!edits_first) {
+      anchors.Take(made);
+      anchors.Take(moved);
+    }
+    EXPECT_EQ(anchors.TakeNotPlaced().size(), 1u);
+    ASSERT_EQ(anchors.All().size(), 1u) << edits_first;
+    EXPECT_EQ(anchors.All()[0].revision, 2);
+    const Keyframe& keyframe = world_.agents[0].keyframes[5];
+    EXPECT_LT(
+        (anchors.All()[0].T_odom_anchor.t - keyframe.T_odom_body * made.T_ref_anchor.t).norm(),
+        0.03);
+  }
+}
+
 TEST_F(AnchorsTest, ANewKeyframeLiesOnTheOdometryBehindTheMap) {
   const AnchorEdit edit = Edit(0, 19);
   anchors_.Take(edit);

@@ -40,7 +40,10 @@ class Collector {
   LoggedAnchors Finish() {
     for (const auto& [id, entry] : registry_.entries()) {
       logged_.anchors[id] = {entry.revision, entry.edited_by, entry.deleted, entry.name,
-                             entry.payload,  std::nullopt,    entry.place};
+                             entry.payload,  std::nullopt,    std::nullopt};
+      if (!entry.places.empty()) {
+        logged_.anchors[id].place = entry.places.rbegin()->second;
+      }
     }
     for (auto& [id, state] : states_) {
       LoggedAnchor& anchor = logged_.anchors[id];

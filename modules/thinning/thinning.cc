@@ -103,29 +103,37 @@ std::set<MapId> Thinning::Whole(const Solution& solution, int64_t now_utime) con
   return whole;
 }
 
+// The keyframes that place an anchor by this edit.
+void Thinning::Keep(const AnchorEdit& place, std::set<KeyframeId>* must_stay) const {
+  const auto map = stored_.find(place.map);
+  if (map == stored_.end()) {
+    return;
+  }
+  const std::vector<Keyframe>& keyframes = map->second.keyframes;
+  int64_t utime = place.utime;
+  if (place.placement == AnchorEdit::Placement::kKeyframe) {
+    const auto at = std::ranges::lower_bound(keyframes, place.keyframe_seq, {},
+                                             [](const Keyframe& k) { return k.id.seq; });
+    utime = at == keyframes.end() ? keyframes.back().utime : at->utime;
+  }
+  // Include one keyframe before and one after the reach: a stationary body has few keyframes.
+  const auto first =
+      std::ranges::lower_bound(keyframes, utime - kPlacementReach_us, {}, &Keyframe::utime);
+  const auto last =
+      std::ranges::upper_bound(keyframes, utime + kPlacementReach_us, {}, &Keyframe::utime);
+  for (auto it = first == keyframes.begin() ? first : first - 1;
+       it != keyframes.end() && it <= last; ++it) {
+    must_stay->insert(it->id);
+  }
+}
+
 std::set<KeyframeId> Thinning::MustStay(const Solution& solution) const {
   std::set<KeyframeId> must_stay;
   for (const auto& [id, anchor] : anchors_.entries()) {
-    const auto map =
-        anchor.deleted || !anchor.place ? stored_.end() : stored_.find(anchor.place->map);
-    if (map == stored_.end()) {
-      continue;
-    }
-    const std::vector<Keyframe>& keyframes = map->second.keyframes;
-    int64_t utime = anchor.place->utime;
-    if (anchor.place->placement == AnchorEdit::Placement::kKeyframe) {
-      const auto at = std::ranges::lower_bound(keyframes, anchor.place->keyframe_seq, {},
-                                               [](const Keyframe& k) { return k.id.seq; });
-      utime = at == keyframes.end() ? keyframes.back().utime : at->utime;
-    }
-    // Include one keyframe before and one after the reach: a stationary body has few keyframes.
-    const auto first =
-        std::ranges::lower_bound(keyframes, utime - kPlacementReach_us, {}, &Keyframe::utime);
-    const auto last =
-        std::ranges::upper_bound(keyframes, utime + kPlacementReach_us, {}, &Keyframe::utime);
-    for (auto it = first == keyframes.begin() ? first : first - 1;
-         it != keyframes.end() && it <= last; ++it) {
-      must_stay.insert(it->id);
+    for (const auto& [order, place] : anchor.places) {
+      if (!anchor.deleted) {
+        Keep(place, &must_stay);
+      }
     }
   }
   for (const auto& [id, constraint] : constraints_) {

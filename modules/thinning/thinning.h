@@ -98,6 +98,7 @@ class Thinning {
   Solution Solve(const ThinnedMaps& without) const;
   void FillGraph(const ThinnedMaps& without, PoseGraph* graph) const;
   std::set<MapId> Whole(const Solution& solution, int64_t now_utime) const;
+  void Keep(const AnchorEdit& place, std::set<KeyframeId>* must_stay) const;
   std::set<KeyframeId> MustStay(const Solution& solution) const;
   ThinnedMaps Make(const Solution& solution, const std::set<MapId>& whole);
   std::set<KeyframeId> Gone(const Solution& solution, const std::set<MapId>& whole);

@@ -303,6 +303,29 @@ TEST_F(ThinningTest, WhatPlacesAnAnchorStays) {
             std::sqrt(before.covariance.topLeftCorner<3, 3>().trace()));
 }
 
+// The map may have no surface where the anchor was moved to: then it stays where it was.
+TEST_F(ThinningTest, WhatPlacesAnAnchorThatWasMovedToASurfaceStaysToo) {
+  AnchorEdit edit;
+  edit.anchor = {2, 7};
+  edit.agent_id = 2;
+  edit.right = AnchorRight::kEditOwn;
+  edit.placement = AnchorEdit::Placement::kKeyframe;
+  edit.map = world_.agents[1].map;
+  edit.keyframe_seq = 25;
+  Thinning thinning = MakeThinning();
+  thinning.Take(edit);
+  edit.revision = 2;
+  edit.placement = AnchorEdit::Placement::kPixel;
+  edit.map = world_.agents[2].map;
+  edit.utime = world_.agents[2].keyframes[25].utime;
+  thinning.Take(edit);
+  const ThinnedMaps thinned = thinning.Thin(kNow);
+  for (const int agent : {1, 2}) {
+    EXPECT_GT(NumGone(thinned, agent), kKeyframes / 3);
+    EXPECT_FALSE(thinned.gone.contains({world_.agents[agent].map, 25})) << agent;
+  }
+}
+
 TEST_F(ThinningTest, EvidenceBetweenMapsThatAreNotFusedStays) {
   // The second visit has one constraint, which is not enough for a fusion.
   const MapId alone = world_.agents[1].map;
