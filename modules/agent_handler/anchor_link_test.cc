@@ -50,6 +50,18 @@ TEST_F(AnchorLink, ATapCarriesThePoseOfItsImage) {
   EXPECT_NEAR(journalled.begin()->second.T_odom_body->t.x(), 0.25, 1e-9);
 }
 
+// Else the server would wait for ever: no keyframe of that map comes after the tap.
+TEST_F(AnchorLink, ATapJustBeforeItsMapEndsCarriesThePoseOfItsImage) {
+  Run(2);
+  RequestTap();
+  Run(0.1);
+  PublishPose(1'300'000, {9, 9, 9}, {kMap.agent_id, kMap.opened_utime + 1});
+  Run(12);
+  ASSERT_EQ(journalled.size(), 1u);
+  ASSERT_TRUE(journalled.begin()->second.T_odom_body);
+  EXPECT_NEAR(journalled.begin()->second.T_odom_body->t.x(), 0.25, 1e-9);
+}
+
 TEST_F(AnchorLink, AnOvertakenStateDoesNotReplaceANewerOne) {
   link_bus.held = 0.3;
   Run(2);

@@ -68,11 +68,12 @@ class AnchorLink : public LinkWorld {
   void PublishAnchor(const AnchorState& state) {
     PublishMessage(server_bus, channels::Anchor(1), ToMessage(state));
   }
-  void PublishPose(int64_t utime, const Eigen::Vector3d& t_odom_body = {0, 0, 0}) {
+  void PublishPose(int64_t utime, const Eigen::Vector3d& t_odom_body = {0, 0, 0},
+                   const MapId& map = kMap) {
     pose_t pose{};
     pose.utime = utime;
     pose.state = pose_t::STATE_TRACKING;
-    pose.map = ToMessage(kMap);
+    pose.map = ToMessage(map);
     pose.T_odom_body = pose.T_map_body =
         ToMessage(Rigid3(Eigen::Quaterniond::Identity(), t_odom_body));
     PublishMessage(agent_bus, "POSE_1", pose);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <iterator>
 #include <limits>
 #include <ranges>
 #include <tuple>
@@ -48,10 +49,10 @@ std::string Anchors::Take(const AnchorEdit& edit) {
   return refused;
 }
 
-PlacementResult Anchors::Try(const AnchorEdit& edit) const {
+PlacementResult Anchors::Try(const AnchorEdit& edit, bool ended) const {
   static const OdometryTrack kNoKeyframes;
   const auto track = tracks_.find(edit.map);
-  return Place(edit, track == tracks_.end() ? kNoKeyframes : track->second, kHolds);
+  return Place(edit, track == tracks_.end() ? kNoKeyframes : track->second, kHolds, ended);
 }
 
 std::optional<Rigid3> Anchors::TryInGroup(const AnchorEdit& edit) const {
@@ -86,7 +87,7 @@ void Anchors::MakeExact(AnchorEdit* edit) const {
 
 // The newest edit that can be placed counts, in whatever order edits and keyframes come: while it
 // waits for a keyframe, or if its placement fails, an older one does.
-void Anchors::PlaceOrWait(const AnchorId& id) {
+void Anchors::PlaceOrWait(const AnchorId& id, const std::optional<MapId>& ended) {
   Tries& tries = tries_[id];
   for (const auto& [order, edit] : std::views::reverse(registry_.entries().at(id).places)) {
     if (order <= tries.placed) {
@@ -95,7 +96,7 @@ void Anchors::PlaceOrWait(const AnchorId& id) {
     if (tries.failed.contains(order)) {
       continue;
     }
-    PlacementResult result = Try(edit);
+    PlacementResult result = Try(edit, edit.map == ended);
     if (auto* const placement = std::get_if<AnchorPlacement>(&result)) {
       placements_[id] = std::move(*placement);
       tries.placed = order;
@@ -112,6 +113,35 @@ void Anchors::PlaceOrWait(const AnchorId& id) {
       waiting_[edit.map].insert(id);
     }
   }
+}
+
+void Anchors::PlaceInEndedMaps() {
+  std::map<MapId, int32_t> newest_seqs;
+  for (const auto& [map, ids] : waiting_) {
+    if (const auto track = tracks_.find(map); track != tracks_.end()) {
+      newest_seqs[map] = track->second.keyframes().rbegin()->first;
+    }
+  }
+  for (const auto& [map, seq] : newest_seqs) {
+    if (const auto before = newest_seqs_.find(map);
+        before != newest_seqs_.end() && before->second == seq) {
+      const auto waiting = waiting_.extract(map);
+      for (const AnchorId& id : waiting.mapped()) {
+        PlaceOrWait(id, map);
+      }
+    }
+  }
+  newest_seqs_ = std::move(newest_seqs);
+}
+
+size_t Anchors::num_waiting() const {
+  std::set<AnchorId> ids;
+  for (const auto& [map, waiting] : waiting_) {
+    std::ranges::copy_if(waiting, std::inserter(ids, ids.end()), [this](const AnchorId& id) {
+      return !registry_.entries().at(id).deleted;
+    });
+  }
+  return ids.size();
 }
 
 void Anchors::Take(const MapState& state) {

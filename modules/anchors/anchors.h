@@ -58,6 +58,10 @@ class Anchors {
   void Take(const MapState& state);
   void Take(const Correction& correction);
 
+  // Maps that have had no new keyframe since the last call count as ended: anchors that wait there
+  // are placed by the keyframes before them.
+  void PlaceInEndedMaps();
+
   // The map that an agent's odometry is in, as its poses say. Map ids do not: the agent's clock may
   // have been set back.
   void SetCurrentMap(const MapId& map) { current_maps_[map.agent_id] = map; }
@@ -95,7 +99,7 @@ class Anchors {
   // Null for a map without keyframes.
   const TrackedKeyframe* NewestKeyframe(const MapId& map) const;
   // The placement that an edit would have, with the present maps.
-  PlacementResult Try(const AnchorEdit& edit) const;
+  PlacementResult Try(const AnchorEdit& edit, bool ended = false) const;
   // Corrects a pose relative to a keyframe, so that the anchor comes out where this keyframe has it
   // with the present maps. Changes nothing if the edit has no such pose, or the keyframe is
   // missing.
@@ -105,7 +109,8 @@ class Anchors {
   size_t num_placed() const;
   RecordCounters store_counters() const;
   const RecordStore* records() const { return records_.get(); }
-  size_t num_waiting() const { return waiting_.size(); }
+  // Anchors that wait for a keyframe, for their place or a newer one.
+  size_t num_waiting() const;
   // Reasons why anchors could not be placed, since the last call.
   std::vector<std::string> TakeNotPlaced() { return std::exchange(not_placed_, {}); }
 
@@ -124,7 +129,8 @@ class Anchors {
 
   // The anchor's pose in its group's frame with the placement of Try; empty if there is none.
   std::optional<Rigid3> TryInGroup(const AnchorEdit& edit) const;
-  void PlaceOrWait(const AnchorId& id);
+  // `ended`: a map that is known to have ended.
+  void PlaceOrWait(const AnchorId& id, const std::optional<MapId>& ended = std::nullopt);
   Rigid3 T_map_body(const MapId& map, int32_t seq) const;
   InGroup Position(const AnchorPlacement& placement) const;
   // The pose of each placed anchor.
@@ -147,6 +153,7 @@ class Anchors {
   GroupStates<PosedGroup> groups_;
   std::map<MapId, Correction> corrections_;
   std::map<int32_t, MapId> current_maps_;  // by agent
+  std::map<MapId, int32_t> newest_seqs_;   // at the last call of PlaceInEndedMaps
   std::vector<std::string> not_placed_;
   // Cache; empty after a change.
   mutable std::optional<std::map<AnchorId, InGroup>> positions_;

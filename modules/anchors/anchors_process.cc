@@ -19,6 +19,8 @@ namespace {
 constexpr int64_t kSecond_us = 1'000'000;
 constexpr int64_t kPublishInterval_us = 250'000;
 constexpr int64_t kOthersInterval_us = 200'000;
+// A stationary agent makes a keyframe every five seconds.
+constexpr int64_t kEndedInterval_us = 10 * kSecond_us;
 constexpr int32_t kMaxAsked = 50;
 // agent_handler repeats the newest edit every second, so after this time any gap is known.
 constexpr int64_t kNewestEditRepeated_us = 2 * kSecond_us;
@@ -130,7 +132,17 @@ void AnchorsProcess::PublishOthers(int64_t now_utime) {
   }
 }
 
+void AnchorsProcess::PlaceInEndedMaps(int64_t now_utime) {
+  if (now_utime >= next_ended_utime_ && !journal_.catching_up()) {
+    next_ended_utime_ = now_utime + kEndedInterval_us;
+    anchors_.PlaceInEndedMaps();
+  }
+}
+
 void AnchorsProcess::Finish() {
+  for (int i = 0; i < 2; ++i) {  // no keyframe comes in between
+    anchors_.PlaceInEndedMaps();
+  }
   for (const AnchorState& state : anchors_.All()) {
     node_.Publish(std::string(channels::kAnchor), ToMessage(state));
   }
@@ -141,6 +153,7 @@ void AnchorsProcess::Tick(int64_t now_utime) {
   have_utime_ = have_received_ && have_utime_ == 0 ? now_utime : have_utime_;
   journal_.Tick(now_utime);
   RequestMissingEdits(now_utime);
+  PlaceInEndedMaps(now_utime);
   PublishDue(now_utime);
   PublishOthers(now_utime);
   if (node_.StatusIsDue(now_utime)) {

@@ -55,6 +55,7 @@ class AnchorsProcess : public Process {
   void OnEdit(AnchorEdit edit);
   void OnPose(const pose_t& message);
   void RequestMissingEdits(int64_t now_utime);
+  void PlaceInEndedMaps(int64_t now_utime);
   void PublishDue(int64_t now_utime);
   void PublishOthers(int64_t now_utime);
   void PublishStatus(int64_t now_utime);
@@ -72,6 +73,7 @@ class AnchorsProcess : public Process {
   int64_t have_utime_ = 0;  // of the first tick after the first HAVE
   int64_t now_utime_ = 0;
   int64_t next_request_utime_ = 0;
+  int64_t next_ended_utime_ = 0;
   int64_t next_publish_utime_ = 0;
   int64_t next_others_utime_ = 0;
 };

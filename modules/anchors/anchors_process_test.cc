@@ -209,6 +209,24 @@ TEST_F(AnchorsProcessTest, InAReplayTheEndSaysWhereTheyAre) {
   EXPECT_EQ(for_watchers_.size(), 1u);
 }
 
+TEST_F(AnchorsProcessTest, AnAnchorAfterTheLastKeyframeOfItsMapDoesNotWaitForEver) {
+  SendMap();
+  const Keyframe& last = world_.agents[0].keyframes.back();
+  anchor_edit_t edit = Edit(0, world_.agents[0]);
+  edit.placement = anchor_edit_t::PLACEMENT_BODY;
+  edit.utime = last.utime + 300'000;
+  edit.has_T_odom_body = 1;
+  edit.T_odom_body = ToMessage(last.T_odom_body);
+  Send(edit);
+  Tick(50);
+  EXPECT_TRUE(for_agent_2_.empty()) << "a keyframe may still come";
+  EXPECT_EQ(status_.pending, 1);
+  Tick(250);
+  EXPECT_EQ(status_.pending, 0);
+  ASSERT_FALSE(for_agent_2_.empty());
+  EXPECT_EQ(for_agent_2_[0].state, anchor_t::STATE_PLACED);
+}
+
 TEST_F(AnchorsProcessTest, RefusesWhatIsNotFromTheJournalOrNotAllowed) {
   SendMap();
   anchor_edit_t unnumbered = Edit(0, world_.agents[0]);

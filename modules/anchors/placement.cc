@@ -169,7 +169,7 @@ Pose Relative(const AnchorEdit& edit, const Rigid3& T_odom_ref) {
 
 }  // namespace
 
-PlacementResult Place(const AnchorEdit& edit, const OdometryTrack& track, int holds) {
+PlacementResult Place(const AnchorEdit& edit, const OdometryTrack& track, int holds, bool ended) {
   if (edit.placement == AnchorEdit::Placement::kKeyframe) {
     const TrackedKeyframe* const keyframe = track.Find(edit.keyframe_seq);
     if (keyframe == nullptr) {
@@ -178,14 +178,22 @@ PlacementResult Place(const AnchorEdit& edit, const OdometryTrack& track, int ho
     return Held(edit, track, keyframe->utime, Relative(edit, keyframe->T_odom_body), holds);
   }
   // A quick test: an edit whose time is wrong waits for ever, and is tried with each keyframe.
-  if (track.keyframes().empty() || track.keyframes().rbegin()->second.utime < edit.utime) {
+  if (track.keyframes().empty()) {
+    return AwaitsKeyframe();
+  }
+  const int64_t last_utime = track.keyframes().rbegin()->second.utime;
+  const int64_t reach_us = ended && edit.T_odom_body ? kPlacementReach_us : 0;
+  if (last_utime < edit.utime - reach_us) {
     return AwaitsKeyframe();
   }
   const bool on_surface = edit.placement == AnchorEdit::Placement::kPixel;
   const CameraModel& camera = *track.Nearest(edit.utime)->second.camera;
-  const int64_t seen_utime = edit.utime + (on_surface ? RowTime_us(camera, edit.pixel) : 0);
-  if (track.keyframes().rbegin()->second.utime < seen_utime) {
-    return AwaitsKeyframe();
+  int64_t seen_utime = edit.utime + (on_surface ? RowTime_us(camera, edit.pixel) : 0);
+  if (last_utime < seen_utime) {
+    if (!ended) {
+      return AwaitsKeyframe();
+    }
+    seen_utime = std::max(last_utime, edit.utime);
   }
   const auto T_odom_body = BodyAt(seen_utime, edit, track);
   if (!T_odom_body) {

@@ -39,7 +39,10 @@ struct NotPlaced {
 using PlacementResult = std::variant<AnchorPlacement, AwaitsKeyframe, NotPlaced>;
 
 // `track`: the keyframes of the edit's map received so far. `holds`: maximum number of keyframes.
+// `ended`: no later keyframe will come; so those up to kPlacementReach_us before an edit that has
+// its own pose do.
 // An anchor on a surface is upright: its z axis points up, its x axis horizontally to the viewer.
-PlacementResult Place(const AnchorEdit& edit, const OdometryTrack& track, int holds);
+PlacementResult Place(const AnchorEdit& edit, const OdometryTrack& track, int holds,
+                      bool ended = false);
 
 }  // namespace pangea

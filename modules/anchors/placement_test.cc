@@ -205,6 +205,39 @@ TEST_F(PlacementTest, WaitsForWhatIsStillToCome) {
   EXPECT_TRUE(std::holds_alternative<AwaitsKeyframe>(Place(later, OdometryTrack(), 8)));
 }
 
+// Of a map that has ended, the keyframes before the edit are all that there will be.
+TEST_F(PlacementTest, AfterTheLastKeyframeOfAMapThatHasEnded) {
+  const Keyframe& last = agent().keyframes.back();
+  AnchorEdit edit = Edit(Placement::kPixel, last.id.seq);
+  edit.utime += 200'000;
+  edit.pixel = last.corners[last.points[10].corner].pixel.cast<double>();
+  EXPECT_TRUE(std::holds_alternative<AwaitsKeyframe>(Place(edit, track_, 8, true))) << "no pose";
+  edit.T_odom_body = last.T_odom_body;
+  EXPECT_TRUE(std::holds_alternative<AwaitsKeyframe>(Place(edit, track_, 8)));
+  AnchorEdit at_the_last = edit;
+  at_the_last.utime = last.utime;
+  const auto result = Place(edit, track_, 8, true), expected = Place(at_the_last, track_, 8);
+  EXPECT_LT((Positions(track_, std::get<AnchorPlacement>(result))[0] -
+             Positions(track_, std::get<AnchorPlacement>(expected))[0])
+                .norm(),
+            0.01);
+  edit.utime = last.utime + kPlacementReach_us + 1;
+  EXPECT_TRUE(std::holds_alternative<AwaitsKeyframe>(Place(edit, track_, 8, true)));
+}
+
+TEST_F(PlacementTest, ThePixelOfARollingShutterIsSeenInTheLastKeyframeOfAMap) {
+  OdometryTrack track;
+  for (Keyframe keyframe : agent().keyframes) {
+    keyframe.camera.readout_s = 0.03;
+    track.Add(keyframe);
+  }
+  const Keyframe& last = agent().keyframes.back();
+  AnchorEdit edit = Edit(Placement::kPixel, last.id.seq);
+  edit.pixel = last.corners[last.points[10].corner].pixel.cast<double>();
+  EXPECT_TRUE(std::holds_alternative<AwaitsKeyframe>(Place(edit, track, 8)));
+  EXPECT_TRUE(std::holds_alternative<AnchorPlacement>(Place(edit, track, 8, true)));
+}
+
 TEST_F(PlacementTest, SaysWhyNot) {
   AnchorEdit before = Edit(Placement::kBody, 0);
   before.utime -= 1;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <utility>
 
 namespace pangea {
 namespace {
@@ -24,45 +25,41 @@ typename std::deque<Stamped>::const_iterator FirstFrom(const std::deque<Stamped>
 
 }  // namespace
 
-void PoseHistory::Open(const MapId& map) {
-  if (map != map_) {
-    poses_.clear();
-    corrections_.clear();
-    map_ = map;
-  }
-}
-
 void PoseHistory::AddPose(int64_t utime, const MapId& map, const Rigid3& T_odom_body) {
-  Open(map);
-  if (!poses_.empty() && utime <= poses_.back().utime) {
+  if (map != now_.map) {
+    before_ = std::exchange(now_, {map, {}, {}});
+  }
+  std::deque<Entry>& poses = now_.poses;
+  if (!poses.empty() && utime <= poses.back().utime) {
     return;
   }
-  poses_.push_back({utime, T_odom_body});
-  while (poses_.size() > kMaxPoses || utime - poses_.front().utime > kLength_us) {
-    poses_.pop_front();
+  poses.push_back({utime, T_odom_body});
+  while (poses.size() > kMaxPoses || utime - poses.front().utime > kLength_us) {
+    poses.pop_front();
   }
 }
 
 void PoseHistory::AddKeyframe(int64_t utime, const MapId& map, const Rigid3& T_odom_body) {
-  auto live = map == map_ ? Live(utime) : std::nullopt;
-  if (!live || (!corrections_.empty() && utime <= corrections_.back().utime)) {
+  auto live = map == now_.map ? now_.Live(utime) : std::nullopt;
+  std::deque<Correction>& corrections = now_.corrections;
+  if (!live || (!corrections.empty() && utime <= corrections.back().utime)) {
     return;  // a repeat, or older than the poses that are kept
   }
-  corrections_.push_back({utime, T_odom_body * live->Inverse()});
-  while (utime - corrections_.front().utime > kLength_us) {
-    corrections_.pop_front();
+  corrections.push_back({utime, T_odom_body * live->Inverse()});
+  while (utime - corrections.front().utime > kLength_us) {
+    corrections.pop_front();
   }
 }
 
-std::optional<Rigid3> PoseHistory::Live(int64_t utime) const {
-  const auto after = FirstFrom(poses_, utime);
-  if (after == poses_.end()) {
+std::optional<Rigid3> PoseHistory::OfMap::Live(int64_t utime) const {
+  const auto after = FirstFrom(poses, utime);
+  if (after == poses.end()) {
     return std::nullopt;
   }
   if (after->utime == utime) {
     return after->T_odom_body;
   }
-  if (after == poses_.begin() || after->utime - std::prev(after)->utime > kMaxGap_us) {
+  if (after == poses.begin() || after->utime - std::prev(after)->utime > kMaxGap_us) {
     return std::nullopt;
   }
   const Entry& before = *std::prev(after);
@@ -70,16 +67,18 @@ std::optional<Rigid3> PoseHistory::Live(int64_t utime) const {
 }
 
 std::optional<Rigid3> PoseHistory::At(int64_t utime, const MapId& map) const {
-  auto live = map == map_ ? Live(utime) : std::nullopt;
-  if (!live || corrections_.empty()) {
+  const OfMap& of_map = map == before_.map ? before_ : now_;
+  auto live = map == of_map.map ? of_map.Live(utime) : std::nullopt;
+  const std::deque<Correction>& corrections = of_map.corrections;
+  if (!live || corrections.empty()) {
     return live;
   }
-  const auto after = FirstFrom(corrections_, utime);
-  if (after == corrections_.begin()) {
+  const auto after = FirstFrom(corrections, utime);
+  if (after == corrections.begin()) {
     return after->T_odom_live * *live;
   }
   const Rigid3 by_before = std::prev(after)->T_odom_live * *live;
-  if (after == corrections_.end()) {
+  if (after == corrections.end()) {
     return by_before;
   }
   return Between(by_before, after->T_odom_live * *live,
@@ -87,7 +86,8 @@ std::optional<Rigid3> PoseHistory::At(int64_t utime, const MapId& map) const {
 }
 
 bool PoseHistory::IsSettled(int64_t utime, const MapId& map) const {
-  return map == map_ && !corrections_.empty() && corrections_.back().utime >= utime;
+  return (map == before_.map && !before_.poses.empty()) ||
+         (map == now_.map && !now_.corrections.empty() && now_.corrections.back().utime >= utime);
 }
 
 }  // namespace pangea

@@ -7,8 +7,8 @@
 // In: POSE_k while the odometry tracks, and the agent's keyframes. Out: the pose at a given time.
 // The pose of a keyframe, which leaves the window seconds later, is more accurate than the live
 // pose was (by half a degree soon after the start). So the result follows the live poses between
-// two keyframes, but is corrected to agree with the keyframes. Bounded: kLength_us of one map,
-// kMaxPoses.
+// two keyframes, but is corrected to agree with the keyframes. The poses of the map before are kept
+// too: it may end while a person names an anchor. Bounded: for each map kLength_us, kMaxPoses.
 
 #include <cstdint>
 #include <deque>
@@ -29,7 +29,8 @@ class PoseHistory {
   void AddKeyframe(int64_t utime, const MapId& map, const Rigid3& T_odom_body);
   // T_odom_body at `utime`; nothing if there are no poses around that time.
   std::optional<Rigid3> At(int64_t utime, const MapId& map) const;
-  // Whether a keyframe at or after that time has come; the result of At will not improve any more.
+  // Whether a keyframe at or after that time has come, or the map has ended; the result of At will
+  // not improve any more.
   bool IsSettled(int64_t utime, const MapId& map) const;
 
  private:
@@ -43,12 +44,15 @@ class PoseHistory {
     Rigid3 T_odom_live;
   };
 
-  void Open(const MapId& map);
-  std::optional<Rigid3> Live(int64_t utime) const;
+  struct OfMap {
+    MapId map;
+    std::deque<Entry> poses;
+    std::deque<Correction> corrections;
 
-  MapId map_;
-  std::deque<Entry> poses_;
-  std::deque<Correction> corrections_;
+    std::optional<Rigid3> Live(int64_t utime) const;
+  };
+
+  OfMap now_, before_;
 };
 
 }  // namespace pangea

@@ -60,14 +60,20 @@ TEST(PoseHistory, BetweenTwoKeyframesTheNearerOneCountsMore) {
   EXPECT_NEAR(history.At(3 * kFrame_us, kMap)->t.x(), 3, 1e-12);
 }
 
-TEST(PoseHistory, ForgetsWhatIsOldAndOtherMaps) {
+TEST(PoseHistory, ForgetsWhatIsOldAndEarlierMaps) {
   PoseHistory history;
   for (int64_t utime = 0; utime <= PoseHistory::kLength_us + kFrame_us; utime += kFrame_us) {
     history.AddPose(utime, kMap, Pose(0));
   }
   EXPECT_FALSE(history.At(0, kMap));
   EXPECT_TRUE(history.At(kFrame_us, kMap));
-  history.AddPose(0, {1, 11}, Pose(0));
+  EXPECT_FALSE(history.IsSettled(2 * kFrame_us, kMap));
+  history.AddPose(0, {1, 11}, Pose(5));
+  EXPECT_LT(history.At(2 * kFrame_us, kMap)->Minus(Pose(0)).norm(), 1e-12) << "it has just ended";
+  EXPECT_TRUE(history.IsSettled(2 * kFrame_us, kMap));
+  EXPECT_LT(history.At(0, {1, 11})->Minus(Pose(5)).norm(), 1e-12);
+  EXPECT_FALSE(history.IsSettled(0, {1, 11}));
+  history.AddPose(0, {1, 12}, Pose(0));
   EXPECT_FALSE(history.At(2 * kFrame_us, kMap));
 }
 
