@@ -1,8 +1,8 @@
 #pragma once
 
 // The server's half of the link, for one agent. It joins pieces to keyframes in a bounded receive
-// cache (the paper, section IV.B, has 210 KiB), checks the keyframes, hands them over in seq order per map, and
-// reports what it has. A state machine: no clock, no bus; not thread safe.
+// cache (the paper, section IV.B, has 210 KiB), checks the keyframes, hands them over in seq order
+// per map, and reports what it has. A state machine: no clock, no bus; not thread safe.
 //
 // A keyframe occupies the cache until it is journalled. When the cache is full, keyframes that the
 // uplink sends first (of the current map, those with the lowest seqs) replace those that it sends
