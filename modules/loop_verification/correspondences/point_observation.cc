@@ -28,8 +28,7 @@ PointObservation MakeObservation(const WindowPair& windows, const PointMatch& ma
 }
 
 std::optional<WhitenedResidual> Residual(const PointObservation& observation, const Rigid3& T_m_c,
-                                         const Eigen::Matrix3d& R,
-                                         Eigen::Matrix<double, 2, 6>* J) {
+                                         const Eigen::Matrix3d& R, Eigen::Matrix<double, 2, 6>* J) {
   const bool forward = observation.direction == Direction::kForward;
   // The point in the observing window: y = X^-1 p or X p.
   const Eigen::Vector3d y = forward ? Eigen::Vector3d(R.transpose() * (observation.p_w - T_m_c.t))
