@@ -109,8 +109,7 @@ TEST_F(JointBaTest, MapsThatAreNotMetricDoubtTheDistance) {
     KeyframeStore store;
     Window m, c;
     for (const auto& [window, map, is_metric] :
-         {std::tuple(&m, MapId{1, 1000}, m_is_metric),
-          std::tuple(&c, MapId{2, 2000}, false)}) {
+         {std::tuple(&m, MapId{1, 1000}, m_is_metric), std::tuple(&c, MapId{2, 2000}, false)}) {
       for (const auto& said : store_.WindowUpTo({map, 5}, 5)) {
         Keyframe keyframe = said->keyframe();
         keyframe.scale_sigma = is_metric ? 0 : kSigma;

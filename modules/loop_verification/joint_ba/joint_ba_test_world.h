@@ -32,8 +32,8 @@ class JointBaTestWindows : public testing::Test {
     only_tracked.triangulation.few_landmarks = -1;
     m_ = MakeWindow(store_.WindowUpTo({walk_m.map, 5}, 5), only_tracked);
     c_ = MakeWindow(store_.WindowUpTo({walk_c.map, 5}, 5), only_tracked);
-    T_m_c_ = m_.T_w_body.back() * agent_m.T_room_body[5].Inverse() *
-             agent_c.T_room_body[5] * c_.T_w_body.back().Inverse();
+    T_m_c_ = m_.T_w_body.back() * agent_m.T_room_body[5].Inverse() * agent_c.T_room_body[5] *
+             c_.T_w_body.back().Inverse();
     for (const Direction direction : kBothDirections) {
       for (int frame = 0; frame < 5; ++frame) {
         const SearchResult found =

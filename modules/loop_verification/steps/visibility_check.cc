@@ -95,8 +95,7 @@ std::string CheckVisibility(const VisibilityOptions& options, Verification* veri
 
 std::string CheckWiderVisibility(const VisibilityOptions& options, Verification* verification) {
   Verification& v = *verification;
-  const auto wide_m =
-      v.window_cache.Make(v.keyframes.m, v.options.window, v.keyframes.after_m);
+  const auto wide_m = v.window_cache.Make(v.keyframes.m, v.options.window, v.keyframes.after_m);
   const auto wide_c = v.window_cache.Make(v.keyframes.c, v.options.window);
   const WindowPair wide{*wide_m, *wide_c};
   const PoseEstimate pose{v.ba->T_m_c, v.pose.covariance};
