@@ -25,7 +25,9 @@ std::optional<AnchorState> AgentAnchors::MakeRoomFor(const AnchorState& state) {
     }
     return entry.number == 0 ? 2 : kInUse;
   };
-  const auto least = std::ranges::min_element(anchors_, {}, usefulness);
+  const auto least =
+      std::min_element(anchors_.begin(), anchors_.end(),
+                       [&](const auto& a, const auto& b) { return usefulness(a) < usefulness(b); });
   if (usefulness(*least) == kInUse) {
     return std::nullopt;
   }
