@@ -89,6 +89,12 @@ std::string ToPem(EVP_PKEY* key) {
   return TextOf(memory.get());
 }
 
+int64_t SecondsOf(const ASN1_TIME* time) {
+  std::tm parts{};
+  Check(ASN1_TIME_to_tm(time, &parts) == 1, "a time");
+  return timegm(&parts);
+}
+
 // The values of an extension as text: "a,b".
 std::string Joined(const std::vector<std::string>& values) {
   return fmt::format("{}", fmt::join(values, ","));
@@ -266,11 +272,12 @@ std::string Fingerprint(const std::string& certificate_pem) {
   return text;
 }
 
+int64_t BeginOf(const std::string& certificate_pem) {
+  return SecondsOf(X509_get0_notBefore(ReadCertificate(certificate_pem).get()));
+}
+
 int64_t ExpiryOf(const std::string& certificate_pem) {
-  const Certificate certificate = ReadCertificate(certificate_pem);
-  std::tm end{};
-  Check(ASN1_TIME_to_tm(X509_get0_notAfter(certificate.get()), &end) == 1, "an expiry");
-  return timegm(&end);
+  return SecondsOf(X509_get0_notAfter(ReadCertificate(certificate_pem).get()));
 }
 
 std::string ToDer(const std::string& certificate_pem) {

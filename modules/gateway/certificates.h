@@ -48,8 +48,9 @@ bool IsGoodFor(const Identity& server, const Identity& authority, const MachineN
 // SHA-256 of the first certificate in the text, as "AB:CD:...". Throws std::runtime_error if there
 // is none.
 std::string Fingerprint(const std::string& certificate_pem);
-// When the first certificate in the text expires, in seconds since 1970. Throws as Fingerprint
-// does.
+// When the first certificate in the text begins to be valid, and expires, in seconds since 1970.
+// Both throw as Fingerprint does.
+int64_t BeginOf(const std::string& certificate_pem);
 int64_t ExpiryOf(const std::string& certificate_pem);
 // The certificate in DER, the file format that phones install.
 std::string ToDer(const std::string& certificate_pem);

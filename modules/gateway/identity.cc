@@ -33,6 +33,10 @@ Identity ReadPair(const fs::path& certificate, const fs::path& key) {
 
 Identity ReadAuthority(const fs::path& folder, int64_t now_s) {
   Identity read = ReadPair(folder / "ca.pem", folder / "ca.key");
+  if (BeginOf(read.certificate_chain_pem) > now_s) {
+    throw std::runtime_error(fmt::format("{}: begins after the date of this machine: set its clock",
+                                         (folder / "ca.pem").string()));
+  }
   if (!CanVouch(read, now_s, kRenewBefore_days)) {
     throw std::runtime_error(
         fmt::format("{}: is too old, or of another key than ca.key: move both away, and each phone "

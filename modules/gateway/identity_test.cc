@@ -149,6 +149,17 @@ TEST_F(IdentityTest, SaysWhatIsWrongWithTheAuthority) {
   }
 }
 
+// For instance on a machine without a battery for its clock.
+TEST_F(IdentityTest, SaysThatTheClockIsBeforeTheAuthority) {
+  Open();
+  try {
+    Open(kIssued_s - 10 * kDay_s);
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("ca.pem: begins after the date of this machine"));
+  }
+}
+
 TEST_F(IdentityTest, TheAddressIsToldToThoseWhoInvite) {
   EXPECT_THROW(ReadAddress(site_), std::runtime_error);
   WriteAddress(site_, {"https://192.168.1.7:8443/", "AB:CD"});
