@@ -12,7 +12,7 @@ test("a player that is stopped while it waits gives no more, and frees the image
     ++open;
     return { utime: images[index].utime, picture: { close: () => --open } };
   });
-  const images = [0, 1, 2].map((i) => ({ utime: 0.05 * i * kSecond_us, name: `${i}.png` }));
+  const images = [0, 1, 2].map((i) => ({ utime: 0.5 * i * kSecond_us, name: `${i}.png` }));
   const recording: Recording = { files: { names: [], read: async () => new Uint8Array() }, imuYaml: "", imu: [], images };
   const given: number[] = [];
   const addImage = async ({ utime, picture }: RecordedPicture) => {
@@ -20,9 +20,7 @@ test("a player that is stopped while it waits gives no more, and frees the image
     picture.close();
   };
   const player = new Player(recording, { addImu: () => {}, addImage }, true);
-  const played = player.play(() => {});
-  setTimeout(() => player.stop(), 20);
-  await played;
+  await player.play(() => void setTimeout(() => player.stop(), 20));
   assert.deepEqual(given, [0]);
   assert.equal(open, 0);
 });
