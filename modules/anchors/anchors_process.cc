@@ -132,9 +132,15 @@ void AnchorsProcess::PublishOthers(int64_t now_utime) {
   }
 }
 
+// What still waits when the journal was received has waited before the restart already.
 void AnchorsProcess::PlaceInEndedMaps(int64_t now_utime) {
-  if (now_utime >= next_ended_utime_ && !journal_.catching_up()) {
-    next_ended_utime_ = now_utime + kEndedInterval_us;
+  const bool has_restarted = !was_complete_ && is_complete();
+  was_complete_ |= has_restarted;
+  if (journal_.catching_up() || (now_utime < next_ended_utime_ && !has_restarted)) {
+    return;
+  }
+  next_ended_utime_ = now_utime + kEndedInterval_us;
+  for (int i = 0; i < (has_restarted ? 2 : 1); ++i) {
     anchors_.PlaceInEndedMaps();
   }
 }

@@ -74,6 +74,7 @@ class AnchorsProcess : public Process {
   int64_t now_utime_ = 0;
   int64_t next_request_utime_ = 0;
   int64_t next_ended_utime_ = 0;
+  bool was_complete_ = false;
   int64_t next_publish_utime_ = 0;
   int64_t next_others_utime_ = 0;
 };

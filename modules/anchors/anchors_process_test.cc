@@ -9,6 +9,7 @@
 #include "messages/channels.h"
 #include "messages/encoding.h"
 #include "pangea/again_t.hpp"
+#include "pangea/have_t.hpp"
 #include "pangea/resend_request_t.hpp"
 #include "pangea/status_t.hpp"
 
@@ -55,6 +56,16 @@ class AnchorsProcessTest : public testing::Test {
     edit.keyframe_seq = 5;
     edit.T_ref_anchor.t = {1, 0, 0};
     return ToMessage(edit);
+  }
+  // At a time after the last keyframe of the first agent's map.
+  anchor_edit_t EditAfterTheMap() const {
+    const Keyframe& last = world_.agents[0].keyframes.back();
+    anchor_edit_t edit = Edit(0, world_.agents[0]);
+    edit.placement = anchor_edit_t::PLACEMENT_BODY;
+    edit.utime = last.utime + 300'000;
+    edit.has_T_odom_body = 1;
+    edit.T_odom_body = ToMessage(last.T_odom_body);
+    return edit;
   }
   void SendMap() {
     MapState state;
@@ -211,13 +222,7 @@ TEST_F(AnchorsProcessTest, InAReplayTheEndSaysWhereTheyAre) {
 
 TEST_F(AnchorsProcessTest, AnAnchorAfterTheLastKeyframeOfItsMapDoesNotWaitForEver) {
   SendMap();
-  const Keyframe& last = world_.agents[0].keyframes.back();
-  anchor_edit_t edit = Edit(0, world_.agents[0]);
-  edit.placement = anchor_edit_t::PLACEMENT_BODY;
-  edit.utime = last.utime + 300'000;
-  edit.has_T_odom_body = 1;
-  edit.T_odom_body = ToMessage(last.T_odom_body);
-  Send(edit);
+  Send(EditAfterTheMap());
   Tick(50);
   EXPECT_TRUE(for_agent_2_.empty()) << "a keyframe may still come";
   EXPECT_EQ(status_.pending, 1);
@@ -225,6 +230,15 @@ TEST_F(AnchorsProcessTest, AnAnchorAfterTheLastKeyframeOfItsMapDoesNotWaitForEve
   EXPECT_EQ(status_.pending, 0);
   ASSERT_FALSE(for_agent_2_.empty());
   EXPECT_EQ(for_agent_2_[0].state, anchor_t::STATE_PLACED);
+}
+
+TEST_F(AnchorsProcessTest, SuchAnAnchorIsThereOnceTheJournalIsAfterARestart) {
+  SendMap();
+  Send(EditAfterTheMap());
+  PublishMessage(bus_, "HAVE", have_t{});
+  bus_.Drain();
+  Tick(25);
+  EXPECT_EQ(process_.anchors().num_placed(), 1u);
 }
 
 TEST_F(AnchorsProcessTest, RefusesWhatIsNotFromTheJournalOrNotAllowed) {
