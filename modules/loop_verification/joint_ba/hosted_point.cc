@@ -95,14 +95,18 @@ double HostedPoint::DepthResidual(const Vector3d& point, double kappa) const {
   return (point.z() - std::exp(-kappa) * inverse_depth) / inverse_depth_sigma;
 }
 
+double HostedPoint::PriorCost(const Vector3d& point, double depth_residual) const {
+  return 0.5 *
+         ((sqrt_info * (point.head<2>() - ray)).squaredNorm() + depth_residual * depth_residual);
+}
+
 double HostedPoint::Cost(const Vector3d& point, const std::vector<PosedCamera>& cameras,
                          double kappa, const RobustLoss& loss) const {
   constexpr double kBehind = std::numeric_limits<double>::infinity();
   if (!(point.z() > kMinInverseDepth)) {
     return kBehind;
   }
-  const double depth = DepthResidual(point, kappa);
-  double cost = 0.5 * ((sqrt_info * (point.head<2>() - ray)).squaredNorm() + depth * depth);
+  double cost = PriorCost(point, DepthResidual(point, kappa));
   const Vector3d p_w = InWorld(point, cameras[host]);
   for (const Observation& observation : seen) {
     const auto projection = Project(observation, p_w, cameras[observation.frame], false);
@@ -186,11 +190,15 @@ void Eliminate(const HostedPoint& hosted, const Vector3d& point,
   of_host.arm = p_w - host.p_w_body;
   of_host.N.setZero();  // sum of J^T J, J with respect to p_w
   of_host.g.setZero();
+  const double depth = hosted.DepthResidual(point, kappa);
+  out.cost = hosted.PriorCost(point, depth);
   for (size_t i = 0; i < hosted.seen.size(); ++i) {
     const HostedPoint::Observation& observation = hosted.seen[i];
     const PosedCamera& camera = cameras[observation.frame];
     const WhitenedObservation projection = *Project(observation, p_w, camera, true);
-    const double weight = loss.Weight(projection.r.squaredNorm());
+    const double squared = projection.r.squaredNorm();
+    out.cost += loss.Cost(squared);
+    const double weight = loss.Weight(squared);
     EliminatedPoint::Pose& pose = out.poses[1 + i];
     pose.arm = p_w - camera.p_w_body;
     pose.N = weight * projection.J.transpose() * projection.J;
@@ -206,7 +214,6 @@ void Eliminate(const HostedPoint& hosted, const Vector3d& point,
       hosted.sqrt_info.transpose() * (hosted.sqrt_info * (point.head<2>() - hosted.ray));
   const double inverse_sigma = 1 / hosted.inverse_depth_sigma;
   const double by_scale = std::exp(-kappa) * hosted.inverse_depth * inverse_sigma;
-  const double depth = hosted.DepthResidual(point, kappa);
   V(2, 2) += inverse_sigma * inverse_sigma;
   g_point.z() += inverse_sigma * depth;
   V.diagonal() *= 1 + damping;

@@ -52,6 +52,7 @@ struct HostedPoint {
                                           const std::vector<PosedCamera>& cameras) const;
   // Residual of the depth's prior, in sigmas.
   double DepthResidual(const Eigen::Vector3d& point, double kappa) const;
+  double PriorCost(const Eigen::Vector3d& point, double depth_residual) const;
   // Infinite if the point is behind a camera that sees it.
   double Cost(const Eigen::Vector3d& point, const std::vector<PosedCamera>& cameras, double kappa,
               const RobustLoss& loss) const;
@@ -69,6 +70,7 @@ struct EliminatedPoint {
     Eigen::Vector3d g;    // gradient before elimination of the point
   };
   std::vector<Pose> poses;
+  double cost = 0;  // of all residuals, as HostedPoint::Cost has it
   Eigen::Vector3d u_scale;
   double h_scale = 0, g_scale = 0;
   Eigen::Matrix3d L;  // V = L L^T; V: the point's own damped information

@@ -210,8 +210,9 @@ JointEquations JointProblem::Linearise(const JointState& state, const RobustLoss
   // Without the columns of the fixed frame, which come last.
   out.H.setZero(n, n);
   out.g.setZero(n);
-  out.cost = Cost(state, loss);
   for (const int side : {kSideM, kSideC}) {
+    const double r = state.log_scale[side] / ScaleSigma(side);
+    out.cost += 0.5 * r * r;
     const double information = 1 / (ScaleSigma(side) * ScaleSigma(side));
     out.H(ScaleColumn(side), ScaleColumn(side)) += information;
     out.g[ScaleColumn(side)] += information * state.log_scale[side];
@@ -220,6 +221,7 @@ JointEquations JointProblem::Linearise(const JointState& state, const RobustLoss
     EdgeResidual::Jacobians jacobians;
     const Vector6d r = edge.residual.Evaluate(state.T_w_body[edge.from], state.T_w_body[edge.to],
                                               state.log_scale[edge.side], &jacobians);
+    out.cost += 0.5 * r.squaredNorm();
     EdgeJacobian J;
     J << jacobians.from, jacobians.to, jacobians.scale;
     AddEdge(J, r, {PoseColumn(edge.from), PoseColumn(edge.to), ScaleColumn(edge.side)}, &out);
@@ -228,6 +230,7 @@ JointEquations JointProblem::Linearise(const JointState& state, const RobustLoss
   for (size_t p = 0; p < points_.size(); ++p) {
     const double kappa = state.log_scale[points_[p].side];
     Eliminate(points_[p], state.points[p], cameras, kappa, loss, damping, &eliminated_[p]);
+    out.cost += eliminated_[p].cost;
     eliminated_[p].AddTo(columns_[p], &out.H, &out.g);
   }
   return out;
