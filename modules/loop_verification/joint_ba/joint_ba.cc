@@ -49,7 +49,8 @@ Matrix6d InAxesOfKm(const Matrix6d& covariance, const Eigen::Matrix3d& R_Km_w, d
 
 std::optional<JointBaResult> SolveJointBa(const WindowPair& windows,
                                           const std::vector<PointMatch>& matches,
-                                          const Rigid3& T_m_c, const JointBaOptions& options) {
+                                          const Rigid3& T_m_c, const JointBaOptions& options,
+                                          JointBaCovariances covariances) {
   JointProblem problem(windows, T_m_c, options);
   JointBaResult result;
   result.inlier.assign(matches.size(), true);
@@ -63,7 +64,7 @@ std::optional<JointBaResult> SolveJointBa(const WindowPair& windows,
     problem.Classify(&result.inlier, &chi2_sum);
   }
   result.num_inlier_observations = static_cast<int>(std::ranges::count(result.inlier, true));
-  const auto marginals = problem.MarginalsOfNewestC(matches, result.inlier);
+  const auto marginals = problem.MarginalsOfNewestC(matches, result.inlier, covariances);
   if (!marginals || result.num_inlier_observations == 0) {
     return std::nullopt;
   }
@@ -82,7 +83,9 @@ std::optional<JointBaResult> SolveJointBa(const WindowPair& windows,
     return InAxesOfKm(covariance, T_w_Km.R().transpose(), std::max(1.0, variance), systematic);
   };
   result.covariance = in_Km(marginals->all);
-  result.covariance_without_one = in_Km(marginals->without_one);
+  if (marginals->without_one) {
+    result.covariance_without_one = in_Km(*marginals->without_one);
+  }
   if (marginals->of_sure) {
     result.covariance_of_sure = in_Km(*marginals->of_sure);
   }

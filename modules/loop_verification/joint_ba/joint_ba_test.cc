@@ -56,6 +56,17 @@ class JointBaTest : public JointBaTestWindows {
   }
 };
 
+// Without the covariances with fewer landmarks, all else is the same.
+TEST_F(JointBaTest, CovarianceOfAllLandmarksAlone) {
+  const auto whole = SolveJointBa(windows_, matches_, T_m_c_, options_);
+  const auto result =
+      SolveJointBa(windows_, matches_, T_m_c_, options_, JointBaCovariances::kOfAllLandmarks);
+  ASSERT_TRUE(whole && result);
+  EXPECT_EQ(result->T_Km_Kc.t, whole->T_Km_Kc.t);
+  EXPECT_EQ(result->covariance, whole->covariance);
+  EXPECT_TRUE(whole->covariance_of_sure && !result->covariance_of_sure);
+}
+
 // covariance_without_one equals the covariance of an optimisation without that landmark.
 TEST_F(JointBaTest, CovarianceWithoutOneLandmark) {
   const auto all = SolveJointBa(windows_, matches_, T_m_c_, options_);

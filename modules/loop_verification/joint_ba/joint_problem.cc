@@ -266,17 +266,23 @@ void JointProblem::Classify(std::vector<bool>* inlier, double* chi2_sum) const {
 }
 
 std::optional<JointProblem::Marginals> JointProblem::MarginalsOfNewestC(
-    const std::vector<PointMatch>& matches, const std::vector<bool>& use) {
+    const std::vector<PointMatch>& matches, const std::vector<bool>& use,
+    JointBaCovariances wanted) {
+  // Without one of so many landmarks the pose is still determined.
+  constexpr size_t kManyLandmarks = 8;
   JointEquations equations = Linearise(state_, {RobustLoss::Kind::kNone}, 0);
   const auto all = CovarianceOfFirst(equations.H);
   if (!all) {
     return std::nullopt;
   }
+  const std::vector<JoinedPoints> landmarks = Landmarks(matches, use);
+  if (wanted == JointBaCovariances::kOfAllLandmarks && landmarks.size() >= kManyLandmarks) {
+    return Marginals{*all, std::nullopt, std::nullopt};
+  }
   std::vector<InformationShare> shares;
   for (size_t p = 0; p < points_.size(); ++p) {
     shares.push_back({eliminated_[p].Information(), columns_[p]});
   }
-  const std::vector<JoinedPoints> landmarks = Landmarks(matches, use);
   const auto without_one = CovarianceWithoutOne(equations.H, shares, landmarks);
   if (!without_one) {
     return std::nullopt;
@@ -288,7 +294,7 @@ std::optional<JointProblem::Marginals> JointProblem::MarginalsOfNewestC(
       }
     }
   }
-  return Marginals{*all, *without_one, CovarianceOfFirst(equations.H)};
+  return Marginals{*all, without_one, CovarianceOfFirst(equations.H)};
 }
 
 std::vector<JoinedPoints> JointProblem::Landmarks(const std::vector<PointMatch>& matches,

@@ -70,11 +70,13 @@ class JointProblem {
   // contributes most, and with the sure landmarks alone. Empty if one of the first two is
   // undetermined.
   struct Marginals {
-    Matrix6d all, without_one;
-    std::optional<Matrix6d> of_sure;  // empty if undetermined
+    Matrix6d all;
+    std::optional<Matrix6d> without_one;  // empty if not wanted
+    std::optional<Matrix6d> of_sure;      // empty if not wanted or undetermined
   };
   std::optional<Marginals> MarginalsOfNewestC(const std::vector<PointMatch>& matches,
-                                              const std::vector<bool>& use);
+                                              const std::vector<bool>& use,
+                                              JointBaCovariances wanted);
 
   // The parts of the last problem, for tests against another solver.
   struct Edge {

@@ -157,7 +157,8 @@ TEST_F(JointProblemTest, SolvesAsCeresDoes) {
     Reference reference(problem, state, loss);
     const double cost = reference.Solve();
     EXPECT_NEAR(problem.Cost(problem.state(), robust) / cost, 1, 1e-4);
-    const auto marginals = problem.MarginalsOfNewestC(matches_, all);
+    const auto marginals =
+        problem.MarginalsOfNewestC(matches_, all, JointBaCovariances::kAlsoOfFewer);
     ASSERT_TRUE(marginals);
     const Vector6d difference = problem.NewestPose(kSideC).Minus(reference.NewestC());
     // A twentieth of a sigma.

@@ -116,8 +116,12 @@ std::string CheckCertainty(const CertaintyOptions& options, Verification* verifi
 std::string CheckHalves(const HalvesOptions& options, Verification* verification) {
   Verification& v = *verification;
   const auto halves = HalvesOfView(v.windows, v.InlierMatches(), v.ba->T_m_c);
-  const auto left = SolveJointBa(v.windows, halves[0], v.ba->T_m_c, v.options.ba);
-  const auto right = SolveJointBa(v.windows, halves[1], v.ba->T_m_c, v.options.ba);
+  const auto solve = [&v](const std::vector<PointMatch>& half) {
+    return SolveJointBa(v.windows, half, v.ba->T_m_c, v.options.ba,
+                        JointBaCovariances::kOfAllLandmarks);
+  };
+  const auto left = solve(halves[0]);
+  const auto right = solve(halves[1]);
   if (!left || !right) {
     return "half of the view gives no pose";
   }
