@@ -166,7 +166,12 @@ bool UdpmReceiver::Handle(int timeout_ms) {
     return true;
   }
   pollfd waits{waits_fd_, POLLIN, 0};
-  return poll(&waits, 1, timeout_ms) > 0 && DeliverOne();
+  while (poll(&waits, 1, timeout_ms) > 0) {
+    if (DeliverOne()) {
+      return true;
+    }  // else it was written for a message that is delivered already
+  }
+  return false;
 }
 
 bool UdpmReceiver::MoreWaits() {
