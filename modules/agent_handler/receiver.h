@@ -20,8 +20,8 @@
 namespace pangea {
 
 struct ReceiverOptions {
-  // A lost piece holds back all later keyframes until it is repeated. This size lets 40 kB/s pass at
-  // a round trip of 4 s and 20 % loss (link_test.cc).
+  // A lost piece holds back all later keyframes until it is repeated. This size lets 40 kB/s pass
+  // at a round trip of 4 s and 20 % loss (link_test.cc).
   int cache_bytes = 1024 * 1024;
 };
 
