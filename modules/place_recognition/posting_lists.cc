@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <span>
 #include <utility>
 
 namespace pangea {
@@ -9,20 +10,68 @@ namespace {
 
 size_t NumLimbs(size_t bits) { return (bits + 63) / 64; }
 
+uint64_t LowestBits(size_t count) { return count < 64 ? (uint64_t{1} << count) - 1 : ~uint64_t{0}; }
+
+// Bits `at` to `at + count - 1` of the string; count is 1 to 64.
+uint64_t ReadBits(const std::vector<uint64_t>& limbs, size_t at, size_t count) {
+  const size_t shift = at % 64;
+  uint64_t bits = limbs[at / 64] >> shift;
+  if (shift + count > 64) {
+    bits |= limbs[at / 64 + 1] << (64 - shift);
+  }
+  return bits & LowestBits(count);
+}
+
+// Copies bits to a place at or after their own, the last first. What is around them stays.
+void MoveBitsUp(size_t from, size_t to, size_t count, std::vector<uint64_t>* limbs) {
+  while (count > 0) {
+    const size_t piece = std::min(count, (to + count - 1) % 64 + 1);  // as it is in one limb
+    count -= piece;
+    const size_t shift = (to + count) % 64;
+    uint64_t& limb = (*limbs)[(to + count) / 64];
+    limb = (limb & ~(LowestBits(piece) << shift)) | ReadBits(*limbs, from + count, piece) << shift;
+  }
+}
+
+void ClearBits(size_t at, size_t count, std::vector<uint64_t>* limbs) {
+  while (count > 0) {
+    const size_t piece = std::min(count, 64 - at % 64);
+    (*limbs)[at / 64] &= ~(LowestBits(piece) << at % 64);
+    at += piece;
+    count -= piece;
+  }
+}
+
+// Makes a large vector longer. It seldom needs new memory: the kernel's work for fresh pages would
+// take most of Pack's time.
+template <typename T>
+void Lengthen(size_t size, std::vector<T>* values) {
+  if (size > values->capacity()) {
+    values->reserve(size + size / 32);
+  }
+  values->resize(size);
+}
+
 }  // namespace
 
 PostingLists::PostingLists(size_t num_words, size_t num_spans, size_t num_postings)
     : num_words_(num_words), num_spans_(num_spans) {
-  const size_t num_bits = num_postings + num_words * num_spans;
-  while (block_shift_ > 0 && (num_bits << block_shift_) > kBitsABlock * num_words) {
-    --block_shift_;
-  }
-  high_.resize(NumLimbs(num_bits));
+  high_.resize(NumLimbs(num_postings + num_words * num_spans));
   low_.resize(num_postings);
   signatures_.resize(num_postings);
-  begin_.resize((num_words + (size_t{1} << block_shift_) - 1) >> block_shift_);
+  block_shift_ = BlockShift();
+  begin_.resize(NumBlocks());
   newest_.resize(begin_.size(), kNone);
   waits_.resize(num_words);
+}
+
+int PostingLists::BlockShift() const {
+  const size_t num_bits = num_packed() + num_words_ * num_spans_;
+  int shift = kMaxBlockShift;
+  while (shift > 0 && (num_bits << shift) > kBitsABlock * num_words_) {
+    --shift;
+  }
+  return shift;
 }
 
 void PostingLists::Add(uint32_t word, int32_t keyframe, uint32_t signature) {
@@ -68,6 +117,17 @@ PostingLists::PackedList PostingLists::Find(uint32_t word) const {
   return ListAt(SkipZeros(BlockBit(BlockOf(word)), InBlock(word) * num_spans_), word);
 }
 
+void PostingLists::ListPacked(size_t block, std::vector<PackedList>* lists) const {
+  lists->clear();
+  const size_t begin = block << block_shift_;
+  const size_t end = std::min(begin + (size_t{1} << block_shift_), num_words_);
+  size_t bit = BlockBit(block);
+  for (size_t word = begin; word < end; ++word) {
+    lists->push_back(ListAt(bit, static_cast<uint32_t>(word)));
+    bit += lists->back().count + num_spans_;
+  }
+}
+
 void PostingLists::ListWaiting(size_t block, std::vector<WordAndNumber>* waiting) const {
   waiting->clear();
   for (uint32_t i = newest_[block]; i != kNone; i = waiting_[i].older) {
@@ -80,45 +140,59 @@ void PostingLists::Pack() {
   if (waiting_.empty()) {
     return;
   }
-  PostingLists packed(num_words_, (waiting_.back().keyframe >> kLowBits) + 1,
-                      num_packed() + num_waiting());
-  size_t made = 0, blocks_begun = 0;
-  const auto put = [&](size_t word, size_t keyframe, uint32_t signature) {
-    for (; blocks_begun << packed.block_shift_ <= word; ++blocks_begun) {
-      packed.begin_[blocks_begun] = static_cast<uint32_t>(made);
-    }
-    const size_t bit = made + word * packed.num_spans_ + (keyframe >> kLowBits);
-    packed.high_[bit / 64] |= uint64_t{1} << (bit % 64);
-    packed.low_[made] = static_cast<uint8_t>(keyframe);
-    packed.signatures_[made] = signature;
-    ++made;
-  };
-  size_t next = 0, bit = 0, word = 0;
+  const size_t num_spans = (waiting_.back().keyframe >> kLowBits) + 1;
+  size_t end = num_packed() + num_waiting();
+  Lengthen(NumLimbs(end + num_words_ * num_spans), &high_);
+  Lengthen(end, &low_);
+  Lengthen(end, &signatures_);
+  std::vector<uint32_t> first(num_words_);  // of each word's postings
   std::vector<WordAndNumber> waiting;
-  for (size_t block = 0; block < begin_.size(); ++block) {
+  std::vector<PackedList> lists;
+  // In place: from the last word to the first each moves to its new place, which is not before its
+  // old one.
+  for (size_t block = begin_.size(); block-- > 0;) {
     ListWaiting(block, &waiting);
-    auto newer = waiting.begin();
-    const auto put_newer_before = [&](size_t end_word) {
-      for (; newer != waiting.end() && newer->first < end_word; ++newer) {
-        const Waiting& posting = waiting_[newer->second];
-        put(newer->first, posting.keyframe, posting.signature);
-      }
-    };
-    const size_t end = block + 1 < begin_.size() ? begin_[block + 1] : num_packed();
-    for (; next < end; ++next, ++bit) {
-      bit = NextOne(bit);
-      while (bit - next >= (word + 1) * num_spans_) {
-        ++word;
-      }
-      put_newer_before(word);
-      const size_t span = bit - next - word * num_spans_;
-      put(word, span << kLowBits | low_[next], signatures_[next]);
+    ListPacked(block, &lists);
+    for (size_t i = lists.size(); i-- > 0;) {
+      const size_t word = (block << block_shift_) + i;
+      const auto newer = std::ranges::find_if(
+          waiting, [word](const WordAndNumber& posting) { return posting.first == word; });
+      end -= lists[i].count + (waiting.end() - newer);
+      PackWord(lists[i], word, num_spans, end, {newer, waiting.end()});
+      waiting.erase(newer, waiting.end());
+      first[word] = static_cast<uint32_t>(end);
     }
-    put_newer_before(num_words_);
   }
-  std::fill(packed.begin_.begin() + static_cast<ptrdiff_t>(blocks_begun), packed.begin_.end(),
-            static_cast<uint32_t>(made));
-  *this = std::move(packed);
+  num_spans_ = num_spans;
+  block_shift_ = BlockShift();
+  begin_.resize(NumBlocks());
+  for (size_t block = 0; block < begin_.size(); ++block) {
+    begin_[block] = first[block << block_shift_];
+  }
+  newest_.assign(begin_.size(), kNone);
+  waits_.assign(num_words_, false);
+  waiting_.clear();
+}
+
+void PostingLists::PackWord(const PackedList& list, size_t word, size_t num_spans, size_t first,
+                            std::span<const WordAndNumber> newer) {
+  std::copy_backward(low_.begin() + list.first, low_.begin() + list.first + list.count,
+                     low_.begin() + first + list.count);
+  std::copy_backward(signatures_.begin() + list.first,
+                     signatures_.begin() + list.first + list.count,
+                     signatures_.begin() + first + list.count);
+  const size_t to = first + word * num_spans;
+  const size_t moved = list.count + num_spans_;
+  MoveBitsUp(list.bit, to, moved, &high_);
+  ClearBits(to + moved, list.count + newer.size() + num_spans - moved, &high_);
+  for (size_t posting = first + list.count; const WordAndNumber& number : newer) {
+    const Waiting& waiting = waiting_[number.second];
+    const size_t bit = posting + word * num_spans + (waiting.keyframe >> kLowBits);
+    high_[bit / 64] |= uint64_t{1} << (bit % 64);
+    low_[posting] = static_cast<uint8_t>(waiting.keyframe);
+    signatures_[posting] = waiting.signature;
+    ++posting;
+  }
 }
 
 void PostingLists::Save(ByteWriter* writer) const {

@@ -16,6 +16,7 @@
 #include <bit>
 #include <cstdint>
 #include <deque>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -30,7 +31,7 @@ class PostingLists {
 
   // Call with ascending keyframes.
   void Add(uint32_t word, int32_t keyframe, uint32_t signature);
-  // Packs the waiting postings. It copies all postings, so call it only when many wait.
+  // Packs the waiting postings. It moves all postings, so call it only when many wait.
   void Pack();
   // Save requires that no posting waits. Restore returns false, and changes nothing, if the bytes
   // are not those of PostingLists with the same number of words and keyframes 0 .. num_keyframes -
@@ -104,6 +105,11 @@ class PostingLists {
   // Empty, with room for `num_postings` packed postings.
   PostingLists(size_t num_words, size_t num_spans, size_t num_postings);
 
+  // Of the present number of packed postings and spans.
+  int BlockShift() const;
+  size_t NumBlocks() const {
+    return (num_words_ + (size_t{1} << block_shift_) - 1) >> block_shift_;
+  }
   size_t BlockOf(size_t word) const { return word >> block_shift_; }
   uint32_t InBlock(uint32_t word) const { return word & ((1U << block_shift_) - 1); }
   size_t BlockBit(size_t block) const {
@@ -154,6 +160,10 @@ class PostingLists {
   // Lists the waiting postings of a block, sorted by word, the oldest first.
   using WordAndNumber = std::pair<size_t, uint32_t>;
   void ListWaiting(size_t block, std::vector<WordAndNumber>* waiting) const;
+  void ListPacked(size_t block, std::vector<PackedList>* lists) const;
+  // Moves a word's list so that its first posting is number `first`, and adds newer postings.
+  void PackWord(const PackedList& list, size_t word, size_t num_spans, size_t first,
+                std::span<const WordAndNumber> newer);
   bool IsConsistent() const;
   // Whether all packed postings are of keyframes 0 .. num_keyframes - 1.
   bool IsOf(size_t num_keyframes) const;

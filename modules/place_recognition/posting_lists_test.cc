@@ -60,6 +60,32 @@ TEST(PostingLists, VisitsWhatPlainListsWouldWheneverItIsPacked) {
   }
 }
 
+// The packed postings do not depend on how often they were packed: they are moved in place.
+TEST(PostingLists, AreTheSameHoweverOftenTheyWerePacked) {
+  constexpr uint32_t kWords = 1000;  // of several blocks, the last of them not full
+  const auto saved = [](int pack_every) {
+    PostingLists lists(kWords);
+    std::mt19937_64 rng(2);
+    for (int keyframe = 0; keyframe < 3000; ++keyframe) {
+      for (int i = 0; i < 30; ++i) {
+        const auto word = static_cast<uint32_t>(std::min(rng() % kWords, rng() % kWords));
+        lists.Add(word, keyframe, static_cast<uint32_t>(rng()));
+      }
+      if (keyframe % pack_every == 0) {
+        lists.Pack();
+      }
+    }
+    lists.Pack();
+    ByteRecordWriter writer;
+    lists.Save(&writer);
+    return writer.Take();
+  };
+  const std::vector<uint8_t> once = saved(3000);
+  for (const int pack_every : {1, 10, 256, 999}) {
+    EXPECT_TRUE(saved(pack_every) == once) << pack_every;
+  }
+}
+
 // A query counts votes by keyframe: a number that no keyframe has would be outside of its memory.
 TEST(PostingLists, AreNotRestoredWithPostingsOfOtherKeyframes) {
   constexpr uint32_t kWords = 12;
