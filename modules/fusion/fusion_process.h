@@ -16,8 +16,8 @@ class FusionProcess : public CandidateProcess {
  public:
   FusionProcess(Bus& bus, const LoopVerifierOptions& options,
                 const std::shared_ptr<RecordStore>& records = nullptr,
-                const CheckpointPlace& checkpoint = {})
-      : CandidateProcess(bus, "fusion", PlaceKind::kInter, options, records, checkpoint) {}
+                const CheckpointPlace& checkpoint = {}, int threads = 1)
+      : CandidateProcess(bus, "fusion", PlaceKind::kInter, options, records, checkpoint, threads) {}
 };
 
 }  // namespace pangea

@@ -349,6 +349,53 @@ TEST(FusionProcess, LiveItListensBeforeItVerifies) {
   EXPECT_EQ(verified, (std::vector<int32_t>{9, 10, 11}));
 }
 
+// Two agents that walk at once: candidates in both directions, far more than one thread's turn.
+std::vector<std::vector<uint8_t>> ResultsWith(int threads) {
+  const auto room = MakeTestRoom({.seed = 5});
+  TestAgentOptions first, second;
+  first.num_keyframes = second.num_keyframes = 12;
+  second.map = {2, 2000};
+  second.radius = 2.3;
+  const TestAgent agents[] = {RunTestAgent(room, first), RunTestAgent(room, second)};
+  LcmBus bus("memq://");
+  LoopVerifierOptions options;
+  options.redundancy.min_between_maps = 2;  // so that some rest on others
+  FusionProcess fusion(bus, options, nullptr, {}, threads);
+  Node listener(bus, "listener");
+  std::vector<std::vector<uint8_t>> results;
+  listener.SubscribeBytes("CONSTRAINT", [&](const std::string&, Bytes data) {
+    results.emplace_back(data.begin(), data.end());
+  });
+  for (int k = 0; k < 12; ++k) {
+    for (const int query : {0, 1}) {
+      const TestAgent& agent = agents[query];
+      const TestAgent& other = agents[1 - query];
+      const Keyframe& keyframe = agent.keyframes[k];
+      PublishMessage(bus, channels::Keyframe(keyframe.id.map.agent_id), ToMessage(keyframe));
+      PlaceMatch match{keyframe.id, {}, {}};
+      for (int m = std::max(0, k - 2); m < k + query; ++m) {
+        match.candidates.push_back(MakeTestCandidate(agent, k, other, m, 40, 10));
+        match.candidates.back().kind = PlaceKind::kInter;
+      }
+      PublishMessage(bus, "PLACE_MATCH", ToMessage(match));
+    }
+    // Some messages come between two verifications.
+    for (int i = 0; i < 5; ++i) {
+      bus.Handle(0);
+    }
+  }
+  while (bus.Handle(0)) {
+  }
+  return results;
+}
+
+TEST(FusionProcess, TheNumberOfThreadsChangesNoByte) {
+  const auto of_one = ResultsWith(1);
+  EXPECT_GT(of_one.size(), 40u);
+  EXPECT_TRUE(ResultsWith(2) == of_one);
+  EXPECT_TRUE(ResultsWith(4) == of_one);
+}
+
 TEST_F(VerificationProcesses, ACornerThatDoesNotExistIsRefused) {
   SendKeyframes(agent_m_, 0, 12);
   SendKeyframes(agent_c_, 0, 12);

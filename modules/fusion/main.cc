@@ -1,9 +1,9 @@
 #include "fusion/fusion_process.h"
-#include "server_process/process_main.h"
+#include "loop_verification/candidate_main.h"
 
 // KEYFRAME_*, PLACE_MATCH --> FusionProcess --> CONSTRAINT
 int main(int argc, char** argv) {
-  return pangea::ServerProcessMain<pangea::FusionProcess, pangea::LoopVerifierOptions>(
+  return pangea::CandidateMain<pangea::FusionProcess>(
       argc, argv, "pangea-fusion",
       "Aligns maps: a verification result for every place match between two maps");
 }

@@ -17,8 +17,9 @@ class InterMapBaProcess : public CandidateProcess {
  public:
   InterMapBaProcess(Bus& bus, const LoopVerifierOptions& options,
                     const std::shared_ptr<RecordStore>& records = nullptr,
-                    const CheckpointPlace& checkpoint = {})
-      : CandidateProcess(bus, "inter_map_ba", PlaceKind::kIntra, options, records, checkpoint) {}
+                    const CheckpointPlace& checkpoint = {}, int threads = 1)
+      : CandidateProcess(bus, "inter_map_ba", PlaceKind::kIntra, options, records, checkpoint,
+                         threads) {}
 };
 
 }  // namespace pangea

@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <functional>
+#include <variant>
 
 #include "bus/record_status.h"
-#include "core/candidates/candidate_order.h"
 #include "core/server_messages.h"
 #include "messages/catch_up_messages.h"
 #include "messages/channels.h"
@@ -23,11 +23,12 @@ constexpr char kJournalOwner[] = "agent_handler";
 CandidateProcess::CandidateProcess(Bus& bus, const std::string& name, PlaceKind kind,
                                    const LoopVerifierOptions& options,
                                    const std::shared_ptr<RecordStore>& records,
-                                   const CheckpointPlace& checkpoint)
+                                   const CheckpointPlace& checkpoint, int threads)
     : node_(bus, name),
       kind_(kind),
       records_(std::make_shared<JournalRecords>(records, LoopVerifier::RecordOf)),
       verifier_(options, records_),
+      threads_(options.alignment, threads),
       journal_(node_,
                {.matches = JournalFollower::Which::kAll,
                 .results = JournalFollower::Which::kOfFormerRuns},
@@ -52,6 +53,7 @@ void CandidateProcess::OnFormerResult(const Constraint& result) {
   const bool of_the_other = result.kind != kind_ && result.kind != PlaceKind::kDerived;
   if (!of_the_other && verified_.insert(result.Id()).second) {
     verifier_.NoteVerified(result);
+    ForgetAhead(result.to);
   }
 }
 
@@ -84,6 +86,7 @@ bool CandidateProcess::TakeMatch(const PlaceMatch& match) {
     node_.Refuse("too many candidates wait");
     return false;
   }
+  ForgetAhead(match.query);
   for (const PlaceCandidate& candidate : match.candidates) {
     if (candidate.kind == kind_ && !verified_.contains(ConstraintId(match.query, candidate))) {
       waiting_.emplace(std::make_pair(match.query, candidate.match), candidate);
@@ -130,8 +133,7 @@ void CandidateProcess::CollectReady() {
   }
 }
 
-// The first ready candidate that depends on no pending one; none if all do.
-std::deque<CandidateProcess::Ready>::iterator CandidateProcess::NextReady() {
+PendingQueries CandidateProcess::Pending() const {
   PendingQueries pending;
   for (const auto& [ids, candidate] : waiting_) {
     pending.Add(ids.first);
@@ -139,8 +141,43 @@ std::deque<CandidateProcess::Ready>::iterator CandidateProcess::NextReady() {
   for (const auto& [query, candidate] : ready_) {
     pending.Add(query);
   }
+  return pending;
+}
+
+// The first ready candidate that depends on no pending one; none if all do.
+std::deque<CandidateProcess::Ready>::iterator CandidateProcess::NextReady() {
+  const PendingQueries pending = Pending();
   return std::ranges::find_if(ready_, [&](const Ready& ready) {
     return !pending.Precede(ready.first, ready.second.match);
+  });
+}
+
+void CandidateProcess::Verify(std::deque<Ready>::iterator next) {
+  const PendingQueries pending = Pending();
+  std::vector<VerificationTask> tasks;
+  for (; next != ready_.end() && tasks.size() < threads_.max_tasks(); ++next) {
+    const auto& [query, candidate] = *next;
+    const std::pair ids(query, candidate.match);
+    if (results_ahead_.contains(ids) || pending.Precede(query, candidate.match)) {
+      continue;
+    }
+    auto prepared = verifier_.Prepare(query, candidate);
+    if (auto* task = std::get_if<VerificationTask>(&prepared)) {
+      tasks.push_back(std::move(*task));
+    } else {
+      results_ahead_.emplace(ids, std::get<Constraint>(prepared));
+    }
+  }
+  for (const Constraint& result : threads_.Run(tasks)) {
+    results_ahead_.emplace(std::pair(result.to, result.from), result);
+  }
+}
+
+// Forgets results that rest on those of this query: more of them are to come, or came from a former
+// run.
+void CandidateProcess::ForgetAhead(const KeyframeId& query) {
+  std::erase_if(results_ahead_, [&query](const auto& result) {
+    return RestsOn(result.first.first, result.first.second, query);
   });
 }
 
@@ -149,25 +186,34 @@ bool CandidateProcess::VerifyNext() {
   if (next == ready_.end()) {
     return false;
   }
-  const auto [query, candidate] = std::move(*next);
-  ready_.erase(next);
+  const std::pair ids(next->first, next->second.match);
   // The journal may deliver the result of a former run after its match.
-  if (!verified_.contains(ConstraintId(query, candidate))) {
-    const Constraint constraint = verifier_.Verify(query, candidate);
-    verified_.insert(constraint.Id());
-    node_.Publish(std::string(channels::kConstraint), ToMessage(constraint));
-    sent_.push_back(constraint);
-    if (sent_.size() > kMaxSent) {
-      sent_.pop_front();
-    }
-    if (constraint.accepted) {
-      node_.Count("accepted");
-      ++num_accepted_;
-    } else {
-      node_.Refuse(constraint.reason);
-    }
+  const bool known = verified_.contains(ConstraintId(next->first, next->second));
+  if (!known && !results_ahead_.contains(ids)) {
+    Verify(next);
+  }
+  ready_.erase(next);
+  const auto result = results_ahead_.extract(ids);
+  if (!known) {
+    Take(result.mapped());
   }
   return !ready_.empty();
+}
+
+void CandidateProcess::Take(const Constraint& constraint) {
+  verified_.insert(constraint.Id());
+  verifier_.NoteVerified(constraint);
+  node_.Publish(std::string(channels::kConstraint), ToMessage(constraint));
+  sent_.push_back(constraint);
+  if (sent_.size() > kMaxSent) {
+    sent_.pop_front();
+  }
+  if (constraint.accepted) {
+    node_.Count("accepted");
+    ++num_accepted_;
+  } else {
+    node_.Refuse(constraint.reason);
+  }
 }
 
 void CandidateProcess::Tick(int64_t now_utime) {

@@ -20,6 +20,10 @@
 // Bounds: at most kMaxWaiting candidates wait; beyond that a match is not accepted, and is
 // requested again when half of them are verified. The newest kMaxSent results are kept for
 // retransmission.
+//
+// With several threads, candidates whose turn has not come, but that depend on no pending one, are
+// verified together with the next one. Their results wait for their turn (results_ahead_), so what
+// is published, and its order, does not depend on the number of threads.
 
 #include <cstdint>
 #include <deque>
@@ -32,7 +36,9 @@
 #include "bus/bus.h"
 #include "bus/node.h"
 #include "bus/process.h"
+#include "core/candidates/candidate_order.h"
 #include "journal_follower/journal_follower.h"
+#include "loop_verification/alignment_threads.h"
 #include "loop_verification/loop_verifier.h"
 #include "messages/catch_up_messages.h"
 
@@ -43,7 +49,7 @@ class CandidateProcess : public Process {
   // `records`: stores keyframes that come over the bus; may be null.
   CandidateProcess(Bus& bus, const std::string& name, PlaceKind kind,
                    const LoopVerifierOptions& options, const std::shared_ptr<RecordStore>& records,
-                   const CheckpointPlace& checkpoint);
+                   const CheckpointPlace& checkpoint, int threads);
   void Tick(int64_t now_utime) override;
 
  private:
@@ -59,9 +65,14 @@ class CandidateProcess : public Process {
   void OnVerificationRequest(const VerificationRequest& request);
   void CollectReady();
   using Ready = std::pair<KeyframeId, PlaceCandidate>;  // (query, candidate)
+  PendingQueries Pending() const;
   std::deque<Ready>::iterator NextReady();
+  // Adds the result of the candidate, and perhaps of others, to results_ahead_.
+  void Verify(std::deque<Ready>::iterator next);
+  void ForgetAhead(const KeyframeId& query);
   // Returns whether another candidate may be ready.
   bool VerifyNext();
+  void Take(const Constraint& constraint);
   void PublishStatus(int64_t now_utime);
   size_t num_pending() const { return waiting_.size() + ready_.size(); }
 
@@ -69,11 +80,13 @@ class CandidateProcess : public Process {
   PlaceKind kind_;
   std::shared_ptr<JournalRecords> records_;
   LoopVerifier verifier_;
+  AlignmentThreads threads_;
   JournalFollower journal_;
   // Candidates that wait for keyframes, by (query, match); and candidates that wait for their turn.
   std::map<std::pair<KeyframeId, KeyframeId>, PlaceCandidate> waiting_;
   std::deque<Ready> ready_;
-  std::set<int64_t> verified_;   // constraint ids
+  std::map<std::pair<KeyframeId, KeyframeId>, Constraint> results_ahead_;  // by (query, match)
+  std::set<int64_t> verified_;                                             // constraint ids
   std::deque<Constraint> sent_;  // newest results, for retransmission
   int64_t num_accepted_ = 0;
 };

@@ -1,6 +1,5 @@
 #include "loop_verification/loop_verifier.h"
 
-#include <optional>
 #include <utility>
 
 namespace pangea {
@@ -51,46 +50,59 @@ bool LoopVerifier::Restore(ByteReader* reader) {
 
 Constraint LoopVerifier::Verify(const KeyframeId& query, const PlaceCandidate& candidate,
                                 LoopVerificationReport* report) {
+  const auto prepared = Prepare(query, candidate);
+  if (const auto* refused = std::get_if<Constraint>(&prepared)) {
+    return *refused;
+  }
+  Constraint result = std::get<VerificationTask>(prepared).Run(&aligner_, report);
+  NoteVerified(result);
+  return result;
+}
+
+std::variant<VerificationTask, Constraint> LoopVerifier::Prepare(const KeyframeId& query,
+                                                                 const PlaceCandidate& candidate) {
   if (candidate.kind == PlaceKind::kIntra && query.map != candidate.match.map) {
     return RefusedConstraint(query, candidate, "intra, but of two maps");
   }
   if (known_.IsRedundant(query, candidate.match, store_)) {
     return RefusedConstraint(query, candidate, kRedundant);
   }
-  Constraint result = Align(query, candidate, report);
-  NoteVerified(result);
-  return result;
+  VerificationTask task;
+  task.candidate = candidate;
+  if (const std::string reason = Complete(query, &task); !reason.empty()) {
+    return RefusedConstraint(query, candidate, reason);
+  }
+  return task;
 }
 
-Constraint LoopVerifier::Align(const KeyframeId& query, const PlaceCandidate& candidate,
-                               LoopVerificationReport* report) {
-  CandidateKeyframes keyframes;
+std::string LoopVerifier::Complete(const KeyframeId& query, VerificationTask* task) {
+  const PlaceCandidate& candidate = task->candidate;
+  CandidateKeyframes& keyframes = task->keyframes;
   keyframes.m = store_.WindowUpTo(candidate.match, Aligner::kNumKeyframes);
   keyframes.c = store_.WindowUpTo(query, Aligner::kNumKeyframes);
   if (keyframes.m.empty() || keyframes.c.empty()) {
-    return RefusedConstraint(query, candidate, "a keyframe was lost");
+    return "a keyframe was lost";
   }
   for (const auto& [corner_c, corner_m] : candidate.corner_matches) {
     if (corner_c >= static_cast<int>(keyframes.c.back()->keyframe().corners.size()) ||
         corner_m >= static_cast<int>(keyframes.m.back()->keyframe().corners.size())) {
-      return RefusedConstraint(query, candidate, "a matched corner does not exist");
+      return "a matched corner does not exist";
     }
   }
-  std::optional<DriftGate> drift_gate;
   if (query.map == candidate.match.map) {
     if (keyframes.c.front()->keyframe().id.seq <= candidate.match.seq) {
-      return RefusedConstraint(query, candidate, "the two keyframes are neighbours");
+      return "the two keyframes are neighbours";
     }
     const auto path_m = store_.PathBetween(candidate.match, query);
     if (!path_m) {
-      return RefusedConstraint(query, candidate, "no odometry leads from one to the other");
+      return "no odometry leads from one to the other";
     }
     // Only within one map: of another map they may not have arrived, and the result must not depend
     // on that.
     keyframes.after_m = store_.WindowBehind(candidate.match, kKeyframesBehind);
-    drift_gate.emplace(drift_, *path_m, keyframes.c.back()->keyframe().T_odom_body.t);
+    task->drift_gate.emplace(drift_, *path_m, keyframes.c.back()->keyframe().T_odom_body.t);
   }
-  return aligner_.Align(keyframes, candidate, drift_gate, report);
+  return {};
 }
 
 }  // namespace pangea

@@ -6,8 +6,10 @@
 // odometry between them; so it does not depend on the order of arrival. Not thread safe.
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "core/keyframe_store.h"
@@ -32,6 +34,17 @@ struct LoopVerifierOptions {
   }
 };
 
+// A candidate with all that its verification needs.
+struct VerificationTask {
+  PlaceCandidate candidate;
+  CandidateKeyframes keyframes;
+  std::optional<DriftGate> drift_gate;  // only within one map
+
+  Constraint Run(Aligner* aligner, LoopVerificationReport* report = nullptr) const {
+    return aligner->Align(keyframes, candidate, drift_gate, report);
+  }
+};
+
 class LoopVerifier {
  public:
   // `records`: stores keyframes (keyframe_store.h); null: they stay in memory.
@@ -48,13 +61,17 @@ class LoopVerifier {
   void NoteLost(const MapId& map, int32_t from_seq, int32_t to_seq) {
     store_.NoteLost(map, from_seq, to_seq);
   }
-  // Adds a verification result of a former run.
+  // Adds a verification result, of this or a former run.
   void NoteVerified(const Constraint& result);
   // Whether all keyframes that the verification needs are here, or lost.
   bool Ready(const KeyframeId& query, const PlaceCandidate& candidate) const;
-  // Call only if Ready. Two keyframes of one map must also pass the drift gate.
+  // Prepare, the task's Run, and NoteVerified in one. Call only if Ready.
   Constraint Verify(const KeyframeId& query, const PlaceCandidate& candidate,
                     LoopVerificationReport* report = nullptr);
+  // The part of Verify that uses this object: the task, or the result if none is needed. Tasks can
+  // run on several threads, each with an aligner of its own. Call only if Ready.
+  std::variant<VerificationTask, Constraint> Prepare(const KeyframeId& query,
+                                                     const PlaceCandidate& candidate);
 
   // The record of a keyframe, as it is stored in `records`.
   static std::vector<uint8_t> RecordOf(const Keyframe& keyframe) {
@@ -68,8 +85,8 @@ class LoopVerifier {
   const RecordCounters& store_counters() const { return store_.counters(); }
 
  private:
-  Constraint Align(const KeyframeId& query, const PlaceCandidate& candidate,
-                   LoopVerificationReport* report);
+  // Fills in the keyframes and, within one map, the drift gate; else returns the reason.
+  std::string Complete(const KeyframeId& query, VerificationTask* task);
 
   DriftGateOptions drift_;
   Aligner aligner_;

@@ -96,6 +96,10 @@ void AddArguments(CLI::App& app, Arguments* arguments) {
   app.add_option(
       "--link", options.link,
       fmt::format("LCM URL of the link bus (default: the site's, or {})", kDefaultLinkUrl));
+  app.add_option("--threads", options.threads,
+                 "that verify candidates, within one map as between maps")
+      ->check(CLI::Range(1, 64))
+      ->capture_default_str();
   AddFolders(app, site, arguments);
   AddSeveralHosts(app, site, arguments);
   AddWeb(app, site, &options);

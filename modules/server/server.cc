@@ -50,6 +50,9 @@ std::vector<std::string> Command(const std::string& process, const ServerSetup& 
   } else {
     argv.insert(argv.end(), {"--bus", options.bus});
   }
+  if (std::ranges::find(kVerifiers, process) != std::end(kVerifiers)) {
+    argv.insert(argv.end(), {"--threads", std::to_string(options.threads)});
+  }
   if (process == "anchors" && !options.http.empty()) {
     argv.insert(argv.end(), {"--http", options.http});
     for (const std::string& origin : options.origins) {
