@@ -49,6 +49,28 @@ test("each image of the camera is closed, those that come after its end too", as
   assert.deepEqual(frames.map(({ closed }) => closed), [1, 1, 1, 1, 1, 1]);
 });
 
+// As VideoCaptureCamera2.java of Chromium: "manual" keeps the exposure time, but the gain becomes that of Android's template.
+test("the focus is locked, but in a dim room the image does not become darker", async ({ mock }) => {
+  const lens = { focus: "continuous", gain: 16 };
+  const track = {
+    ...installBrowser(async () => {}),
+    getCapabilities: () => ({ focusMode: ["continuous", "manual"], exposureMode: ["continuous", "manual"], iso: { min: 100, max: 3200 } }),
+    applyConstraints: async ({ advanced }: { advanced: { focusMode?: string; exposureMode?: string }[] }) => {
+      for (const { focusMode, exposureMode } of advanced) {
+        lens.focus = focusMode ?? lens.focus;
+        if (exposureMode === "manual") lens.gain = 1;
+      }
+    },
+  };
+  const mediaDevices = { getUserMedia: async () => ({ getTracks: () => [track], getVideoTracks: () => [track] }) };
+  Object.defineProperty(globalThis, "navigator", { value: { mediaDevices }, configurable: true });
+  mock.timers.enable({ apis: ["setTimeout"] });
+  await Camera.open();
+  mock.timers.tick(2000);
+  await new Promise(setImmediate);
+  assert.deepEqual(lens, { focus: "manual", gain: 16 });
+});
+
 test("a page that the browser does not trust is told why there is no camera", async () => {
   installBrowser(async () => {});
   Object.defineProperty(globalThis, "navigator", { value: {}, configurable: true });

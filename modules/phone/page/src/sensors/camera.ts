@@ -9,7 +9,7 @@ export interface CameraImage extends Picture {
   utime: number; // us
 }
 
-const kSettle_ms = 1500; // time for focus and exposure to settle before they are locked
+const kSettle_ms = 1500; // time for the focus to settle before it is locked
 
 // A class of Chromium that TypeScript's library lacks.
 declare class MediaStreamTrackProcessor {
@@ -52,7 +52,7 @@ export class Camera {
       camera.stop();
       throw error;
     }
-    setTimeout(() => void camera.lock(), kSettle_ms);
+    setTimeout(() => void camera.lockFocus(), kSettle_ms);
     return camera;
   }
 
@@ -71,13 +71,12 @@ export class Camera {
     for (const track of this.stream.getTracks()) track.stop();
   }
 
-  // Locks focus and exposure, because focusing changes the focal length. If the browser cannot lock them, they stay automatic.
-  private async lock() {
-    const can = (this.track.getCapabilities?.() ?? {}) as Record<string, unknown>;
-    for (const mode of ["focusMode", "exposureMode"]) {
-      if (!Array.isArray(can[mode]) || !can[mode].includes("manual")) continue;
-      await this.track.applyConstraints({ advanced: [{ [mode]: "manual" } as MediaTrackConstraintSet] }).catch(() => {});
-    }
+  // Locks the focus, if the browser can, because focusing changes the focal length. The exposure stays automatic: people walk into darker
+  // rooms, and Chrome on Android locks only the exposure time and resets the gain.
+  private async lockFocus() {
+    const { focusMode } = (this.track.getCapabilities?.() ?? {}) as { focusMode?: string[] };
+    if (!focusMode?.includes("manual")) return;
+    await this.track.applyConstraints({ advanced: [{ focusMode: "manual" } as MediaTrackConstraintSet] }).catch(() => {});
   }
 
   private async readTrack() {
