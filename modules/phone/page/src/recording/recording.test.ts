@@ -67,7 +67,7 @@ test("what the writer writes, the reader reads", async () => {
   const writer = new RecordingWriter("mine");
   writer.addImage(1700000000055000, new Uint8Array([1, 2, 3]), "jpg");
   writer.addImu({ utime: 1700000000050001, gyro: [0.1, -0.2, 0.3], accel: [0, 0, 9.8] });
-  const files = await filesOfZip(writer.finish(kCamera, kImu));
+  const files = await filesOfZip(await writer.finish(kCamera, kImu));
   const { images, imu, cameraYaml, imuYaml } = await openRecording(files);
   assert.deepEqual(imu, [{ utime: 1700000000050001, gyro: [0.1, -0.2, 0.3], accel: [0, 0, 9.8] }]);
   assert.equal(images[0].utime, 1700000000055000);
@@ -79,6 +79,25 @@ test("a recording that is too long for a zip is readable up to there", async () 
   const writer = new RecordingWriter("long");
   for (let i = 0; i < 70_000 && !writer.isFull; ++i) writer.addImage(1700000000000000 + i, new Uint8Array([1]), "jpg");
   assert.ok(writer.numImages > 50_000);
-  const { names } = await filesOfZip(writer.finish(kCamera, kImu));
+  const { names } = await filesOfZip(await writer.finish(kCamera, kImu));
   assert.equal(names.length, writer.numImages + 4);
+});
+
+// A walk goes on while its recording is saved: a pause of 0.3 s would end its map. Other programs run beside a test, so CPU time counts.
+test("finishing ten minutes does not hold up the page", async () => {
+  const writer = new RecordingWriter("long");
+  const jpeg = new Uint8Array(1000);
+  for (let i = 0; i < 18_000; ++i) writer.addImage(1700000000000000 + 33_333 * i, jpeg, "jpg");
+  for (let i = 0; i < 36_000; ++i) writer.addImu({ utime: 1700000000000000 + 16_667 * i, gyro: [Math.sin(i), 0.1, 1 / 3], accel: [Math.cos(i), 0, 9.8] });
+  let longest_us = 0;
+  let before = process.cpuUsage();
+  const timer = setInterval(() => {
+    const { user, system } = process.cpuUsage(before);
+    longest_us = Math.max(longest_us, user + system);
+    before = process.cpuUsage();
+  });
+  await writer.finish(kCamera, kImu);
+  await new Promise((done) => setTimeout(done, 10));
+  clearInterval(timer);
+  assert.ok(longest_us < 200_000, `${longest_us / 1000} ms`);
 });

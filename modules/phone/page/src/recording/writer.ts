@@ -1,10 +1,10 @@
-// Writes a recording in EuRoC's format to a zip while it is made. Images are stored as they are, already compressed, in pieces that
-// the browser may keep on its disk.
+// Writes a recording in EuRoC's format to a zip while it is made. Nothing is compressed, because images already are, and compressing the
+// rest would interrupt the sensors of a walk that goes on.
 
-import { strToU8, Zip, ZipDeflate, ZipPassThrough } from "fflate";
 import type { ImuSample } from "./euroc";
+import { ZipWriter } from "./zip_writer";
 
-const kPartBytes = 4_000_000;
+const kRowsAtOnce = 1000; // a few milliseconds
 // Below the bounds of a zip: 65,535 files and 4 GiB.
 const kMaxImages = 65_000; // 36 minutes at 30 Hz
 const kMaxBytes = 4_000_000_000;
@@ -12,37 +12,27 @@ const kMaxBytes = 4_000_000_000;
 const nanoseconds = (utime: number) => `${utime}000`;
 
 export class RecordingWriter {
-  private readonly parts: Blob[] = [];
-  private recent: Uint8Array<ArrayBuffer>[] = [];
-  private recentBytes = 0;
-  private bytes = 0;
-  private readonly zip: Zip;
+  private readonly zip = new ZipWriter();
   private readonly imageRows = ["#timestamp [ns],filename"];
   private readonly imuRows = [
     "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1]," +
       "a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]",
   ];
-  private failure?: Error;
   numImages = 0;
 
   // `folder`: the name of the recording, the folder that contains mav0.
-  constructor(private readonly folder: string) {
-    this.zip = new Zip((error, data) => {
-      if (error) this.failure = error;
-      else this.keep(data as Uint8Array<ArrayBuffer>);
-    });
-  }
+  constructor(private readonly folder: string) {}
 
   // No further image may be added.
   get isFull(): boolean {
-    return this.numImages >= kMaxImages || this.bytes >= kMaxBytes;
+    return this.numImages >= kMaxImages || this.zip.bytes >= kMaxBytes;
   }
 
   // `extension`: the format of `encoded`, jpg or png.
   addImage(utime: number, encoded: Uint8Array, extension: string) {
     const name = `${nanoseconds(utime)}.${extension}`;
     this.imageRows.push(`${nanoseconds(utime)},${name}`);
-    this.add(new ZipPassThrough(`${this.folder}/mav0/cam0/data/${name}`), encoded);
+    this.zip.add(`${this.folder}/mav0/cam0/data/${name}`, encoded);
     ++this.numImages;
   }
 
@@ -51,30 +41,18 @@ export class RecordingWriter {
   }
 
   // Returns the zip. Nothing can be added afterwards.
-  finish(cameraYaml: string, imuYaml: string): Blob {
-    const text = (name: string, content: string) =>
-      this.add(new ZipDeflate(`${this.folder}/mav0/${name}`), strToU8(content));
-    text("cam0/data.csv", `${this.imageRows.join("\n")}\n`);
-    text("cam0/sensor.yaml", cameraYaml);
-    text("imu0/data.csv", `${this.imuRows.join("\n")}\n`);
-    text("imu0/sensor.yaml", imuYaml);
-    this.zip.end();
-    if (this.failure) throw this.failure;
-    return new Blob([...this.parts, ...this.recent], { type: "application/zip" });
+  async finish(cameraYaml: string, imuYaml: string): Promise<Blob> {
+    const mav0 = `${this.folder}/mav0`;
+    await this.zip.addSlices(`${mav0}/cam0/data.csv`, encoded(this.imageRows));
+    await this.zip.addSlices(`${mav0}/imu0/data.csv`, encoded(this.imuRows));
+    this.zip.add(`${mav0}/cam0/sensor.yaml`, new TextEncoder().encode(cameraYaml));
+    this.zip.add(`${mav0}/imu0/sensor.yaml`, new TextEncoder().encode(imuYaml));
+    return this.zip.finish();
   }
+}
 
-  private keep(data: Uint8Array<ArrayBuffer>) {
-    this.recent.push(data);
-    this.bytes += data.length;
-    this.recentBytes += data.length;
-    if (this.recentBytes < kPartBytes) return;
-    this.parts.push(new Blob(this.recent));
-    this.recent = [];
-    this.recentBytes = 0;
-  }
-
-  private add(file: ZipPassThrough | ZipDeflate, content: Uint8Array) {
-    this.zip.add(file);
-    file.push(content, true);
+function* encoded(rows: string[]): Iterable<Uint8Array> {
+  for (let i = 0; i < rows.length; i += kRowsAtOnce) {
+    yield new TextEncoder().encode(`${rows.slice(i, i + kRowsAtOnce).join("\n")}\n`);
   }
 }
