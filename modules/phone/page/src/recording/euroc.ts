@@ -2,7 +2,8 @@
 
 import { Matrix4 } from "three";
 import { kPhoneImu } from "../sensors/calibration";
-import { parseCamera, parseExtrinsics } from "../view/camera_model";
+import { imuExtrinsics } from "../sensors/sensor_file";
+import { parseCamera } from "../view/camera_model";
 import type { CameraModel } from "../view/camera_model";
 import type { Files } from "./files";
 
@@ -33,7 +34,7 @@ export const isCalibrated = (recording: Recording): recording is CalibratedRecor
 
 // The recording with the calibration from the text of a cam0/sensor.yaml; `file` is its name in messages.
 export function withCamera(recording: Recording, cameraYaml: string, file: string): CalibratedRecording {
-  const T_rig_body = parseExtrinsics(recording.imuYaml, "imu0/sensor.yaml");
+  const T_rig_body = imuExtrinsics(recording.imuYaml, "imu0/sensor.yaml");
   return { ...recording, cameraYaml, camera: parseCamera(cameraYaml, file, T_rig_body) };
 }
 
@@ -84,8 +85,11 @@ export async function openRecording(files: Files): Promise<Recording> {
   const root = rootOf(files.names);
   const present = new Set(files.names);
   if (!present.has(`${root}imu0/data.csv`)) throw new Error(`${root}imu0/data.csv is missing`);
-  const imuFile = `${root}imu0/sensor.yaml`;
-  const imuYaml = present.has(imuFile) ? await text(files, imuFile) : kPhoneImu;
+  // TUM-VI has its calibration in dso/ beside mav0.
+  const dso = `${root.replace(/[^/]*\/$/, "")}dso`;
+  const firstPresent = (...candidates: string[]) => candidates.find((name) => present.has(name));
+  const imuFile = firstPresent(`${root}imu0/sensor.yaml`, `${dso}/imu_config.yaml`);
+  const imuYaml = imuFile === undefined ? kPhoneImu : await text(files, imuFile);
   const imu = parseImu(await text(files, `${root}imu0/data.csv`), `${root}imu0/data.csv`);
   const images = growing(
     rows(await text(files, `${root}cam0/data.csv`), `${root}cam0/data.csv`, 2)
@@ -94,10 +98,10 @@ export async function openRecording(files: Files): Promise<Recording> {
   );
   if (images.length === 0) throw new Error(`${root}cam0/data: none of the images of data.csv is there`);
   const recording = { files, imuYaml, imu, images };
-  const cameraFile = `${root}cam0/sensor.yaml`;
-  if (present.has(cameraFile)) return withCamera(recording, await text(files, cameraFile), cameraFile);
-  if (!parseExtrinsics(imuYaml, imuFile).equals(new Matrix4())) {
-    throw new Error(`${imuFile}: field 'T_BS' must be the identity where ${cameraFile} is missing: the camera is calibrated to the IMU`);
+  const cameraFile = firstPresent(`${root}cam0/sensor.yaml`, `${dso}/camchain.yaml`);
+  if (cameraFile !== undefined) return withCamera(recording, await text(files, cameraFile), cameraFile);
+  if (imuFile !== undefined && !imuExtrinsics(imuYaml, imuFile).equals(new Matrix4())) {
+    throw new Error(`${imuFile}: field 'T_BS' must be the identity where ${root}cam0/sensor.yaml is missing: the camera is calibrated to the IMU`);
   }
   return recording;
 }

@@ -52,6 +52,16 @@ test("without calibration it opens, to be calibrated to its IMU", async () => {
   await assert.rejects(openRecording(strange), /walk\/mav0\/imu0\/sensor.yaml: field 'T_BS' must be the identity/);
 });
 
+test("Kalibr's files serve too, also in dso/ beside mav0, as in TUM-VI", async () => {
+  const camchain = `cam0:\n  ${kCamera.replace("radial-tangential", "radtan").trim().replaceAll("\n", "\n  ")}\n`;
+  const imu = "accelerometer_noise_density: 0.0028\nupdate_rate: 200\n";
+  const here = await openRecording(folder({ "walk/mav0/cam0/sensor.yaml": camchain, "walk/mav0/imu0/sensor.yaml": imu }));
+  assert.equal(here.camera?.width, 640);
+  const beside = { "walk/dso/camchain.yaml": camchain, "walk/dso/imu_config.yaml": imu, "walk/mav0/cam0/sensor.yaml": undefined, "walk/mav0/imu0/sensor.yaml": undefined };
+  const tumVi = await openRecording(folder(beside));
+  assert.deepEqual([tumVi.cameraYaml, tumVi.imuYaml], [camchain, imu]);
+});
+
 test("what is wrong is named with its file", async () => {
   const refused = (changes: Record<string, string | undefined>, says: RegExp) =>
     assert.rejects(openRecording(folder(changes)), says);

@@ -29,6 +29,38 @@ test("the rig's frame is left for the IMU's", () => {
   assert.ok(centre.distanceTo(new Vector3(-0.96, -1.99, -3.005)) < 1e-12);
 });
 
+// As pangea-vio reads it. The camera looks along the body's x axis, 0.1 m before it.
+const camchain = `cam0:
+  camera_model: pinhole
+  intrinsics: [190.9, 190.8, 254.9, 256.8]
+  distortion_model: equidistant
+  distortion_coeffs: [0.003, 0.0007, -0.002, 0.0002]
+  resolution: [512, 512]
+  T_cam_imu:
+  - [0.0, -1.0, 0.0, 0.0]
+  - [0.0, 0.0, -1.0, 0.0]
+  - [1.0, 0.0, 0.0, -0.1]
+  - [0.0, 0.0, 0.0, 1.0]
+  timeshift_cam_imu: 0.002
+cam1:
+  camera_model: pinhole
+`;
+
+test("reads Kalibr's camchain, and its names of lens models", () => {
+  const camera = parseCamera(camchain, "cam0/sensor.yaml");
+  assert.deepEqual(camera.distortion, [0.003, 0.0007, -0.002, 0.0002]);
+  assert.deepEqual(new Vector3(0, 0, 1).applyMatrix4(camera.T_body_cam).toArray(), [1.1, 0, 0]);
+  for (const name of ["radtan", "plumb_bob"]) {
+    assert.equal(parseCamera(euroc.replace("radial-tangential", name), "f").model, "radial-tangential");
+  }
+  assert.equal(parseCamera(phone.replace("equidistant", "equi"), "f").model, "equidistant");
+  const rows = "T_BS: [[0, 1, 0, 0.04], [1, 0, 0, 0.01], [0, 0, -1, -0.005], [0, 0, 0, 1]]";
+  const byRows = euroc.replace(/T_BS:[^\]]*\]/, rows).replace("0.00002]", "0.00002, 0]");
+  assert.deepEqual(parseCamera(byRows, "f"), parseCamera(euroc, "f"));
+  assert.throws(() => parseCamera(byRows.replace("0.00002, 0]", "0.00002, 0.1]"), "f"), /fifth number, 0.1/);
+  assert.throws(() => parseCamera(camchain.replace("cam0:", "cam2:"), "f"), /no sensor 'cam0' in it, but cam2, cam1/);
+});
+
 test("what is missing is named", () => {
   const refused = (text: string, says: RegExp) => assert.throws(() => parseCamera(text, "cam0/sensor.yaml"), says);
   refused(phone.replace("equidistant", "fov"), /cam0\/sensor.yaml: field 'distortion_model'.*'fov'/);

@@ -2,7 +2,7 @@
 // core/camera_model.h: z forward, x right, y down; the centre of the top-left pixel is (0, 0).
 
 import { Matrix4 } from "three";
-import { parse } from "yaml";
+import { cameraExtrinsics, distortionOf, numbersOf, sensorFields } from "../sensors/sensor_file";
 
 export interface CameraModel {
   model: "radial-tangential" | "equidistant";
@@ -14,45 +14,18 @@ export interface CameraModel {
   readout_s: number; // from the first row to the last; 0: a global shutter
 }
 
-type Fields = Record<string, unknown>;
-
-function numbers(fields: Fields, file: string, key: string, count: number): number[] {
-  const value = fields[key];
-  if (!Array.isArray(value) || value.length !== count || !value.every((v) => Number.isFinite(v))) {
-    throw new Error(`${file}: field '${key}' must be ${count} numbers`);
-  }
-  return value as number[];
-}
-
-function parseFields(text: string, file: string): Fields {
-  // Files of Kalibr and OpenCV may begin with %YAML:1.0, which is not valid YAML.
-  const fields: unknown = parse(text.replace(/^%YAML[^\n]*\n/, ""));
-  if (typeof fields !== "object" || fields === null) throw new Error(`${file}: this is no list of fields`);
-  return fields as Fields;
-}
-
-// The T_BS of a camera or IMU: from the sensor to the rig's frame.
-export function parseExtrinsics(text: string, file: string): Matrix4 {
-  const T_BS = parseFields(text, file).T_BS;
-  if (typeof T_BS !== "object" || T_BS === null) throw new Error(`${file}: field 'T_BS' is missing`);
-  return new Matrix4().set(...(numbers(T_BS as Fields, file, "data", 16) as Parameters<Matrix4["set"]>));
-}
-
-// `T_rig_body`: T_BS of the IMU.
+// `T_rig_body`: from the IMU to the rig's frame.
 export function parseCamera(text: string, file: string, T_rig_body = new Matrix4()): CameraModel {
-  const fields = parseFields(text, file);
-  const model = fields.distortion_model;
-  if (model !== "radial-tangential" && model !== "equidistant") {
-    throw new Error(`${file}: field 'distortion_model' must be radial-tangential or equidistant, not '${model}'`);
-  }
-  const [width, height] = numbers(fields, file, "resolution", 2);
+  const fields = sensorFields(text, file, "cam0");
+  const { model, coefficients } = distortionOf(fields, file);
+  const [width, height] = numbersOf(fields, file, "resolution", 2);
   return {
     model,
     width,
     height,
-    intrinsics: numbers(fields, file, "intrinsics", 4) as CameraModel["intrinsics"],
-    distortion: numbers(fields, file, "distortion_coefficients", 4) as CameraModel["distortion"],
-    T_body_cam: T_rig_body.clone().invert().multiply(parseExtrinsics(text, file)),
+    intrinsics: numbersOf(fields, file, "intrinsics", 4) as CameraModel["intrinsics"],
+    distortion: coefficients,
+    T_body_cam: T_rig_body.clone().invert().multiply(cameraExtrinsics(fields, file)),
     readout_s: Number.isFinite(fields.readout_s) ? (fields.readout_s as number) : 0,
   };
 }
