@@ -36,6 +36,7 @@ export class Walk {
   link?: LinkState;
   vio?: ProcessStatus;
   uplink?: ProcessStatus;
+  isMemoryFull = false; // the uplink has refused keyframes since the server was last connected
   brightness = 255;
   motionSilent = false;
   numImages = 0; // number of images that the agent has processed
@@ -209,6 +210,9 @@ export class Walk {
   }
 
   private takeStatus({ vio, uplink, link }: Extract<FromWorker, { kind: "status" }>) {
+    const numRefused = (status?: ProcessStatus) => status?.counters.keyframes_spool_full ?? 0;
+    const refuses = numRefused(uplink) > numRefused(this.uplink);
+    this.isMemoryFull = link !== "open" && (refuses || this.isMemoryFull);
     this.vio = vio ?? this.vio;
     this.uplink = uplink ?? this.uplink;
     this.link = link;

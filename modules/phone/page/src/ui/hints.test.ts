@@ -7,7 +7,7 @@ import type { Situation } from "./hints";
 const pose: PhonePose = {
   utime: 1, state: "tracking", reason: "", map: "2/5", T_odom_body: [0, 0, 0, 0, 0, 0, 1], fused: false, numTracked: 100,
 };
-const good: Situation = { pose, brightness: 120, link: "open", together: [], motionSilent: false, cameraSilent: false };
+const good: Situation = { pose, brightness: 120, link: "open", isMemoryFull: false, together: [], motionSilent: false, cameraSilent: false };
 const says = (change: Partial<Situation>) => hintOf({ ...good, ...change }).text;
 
 test("what to do comes before what is good", () => {
@@ -23,6 +23,7 @@ test("what to do comes before what is good", () => {
   assert.match(says({ pose: { ...pose, state: "lost" } }), /Lost/);
   assert.match(says({ pose: { ...pose, numTracked: 10 } }), /Little to see/);
   assert.match(says({ link: "connecting", together: ["Anna"] }), /No connection/);
+  assert.match(says({ link: "connecting", isMemoryFull: true }), /memory is full/);
   assert.match(says({ link: "refused" }), /new invite/);
   assert.match(says({ link: "replaced" }), /open elsewhere/);
 });

@@ -9,6 +9,7 @@ export interface Situation {
   pose?: PhonePose; // the newest one
   brightness: number; // of the newest image, 0 to 255
   link?: LinkState; // undefined: the agent runs without a server
+  isMemoryFull: boolean; // of keyframes that wait for the server
   together: string[]; // names of the people whose map is fused with this one
   motionSilent: boolean;
   cameraSilent: boolean;
@@ -24,7 +25,7 @@ const kTooDark = "Too dark: find more light.";
 const kDark = 25;
 const kFewFeatures = 25;
 
-export function hintOf({ pose, brightness, link, together, motionSilent, cameraSilent }: Situation): Hint {
+export function hintOf({ pose, brightness, link, isMemoryFull, together, motionSilent, cameraSilent }: Situation): Hint {
   if (motionSilent) return { text: kNoMotion, tone: "bad" };
   if (cameraSilent) return { text: "The camera gives no images. Does another app use it?", tone: "bad" };
   if (!pose) return { text: "Starting…", tone: "do" };
@@ -35,6 +36,9 @@ export function hintOf({ pose, brightness, link, together, motionSilent, cameraS
   if (pose.numTracked < kFewFeatures) return { text: "Little to see here: look at something with more detail.", tone: "do" };
   if (link === "refused") return { text: "The server does not know this phone any more: ask for a new invite.", tone: "bad" };
   if (link === "replaced") return { text: "The page is open elsewhere too, and works there. Stop and start here.", tone: "bad" };
+  if (link === "connecting" && isMemoryFull) {
+    return { text: "No connection for so long that the memory is full: what you walk now is not kept.", tone: "bad" };
+  }
   if (link === "connecting") return { text: "No connection. Walk on: your map is kept, and sent later.", tone: "do" };
   if (together.length > 0) return { text: `In one map with ${listed(together)}. Tap to place an anchor.`, tone: "good" };
   if (link === "open") return { text: "Walk where others have been, to join their map.", tone: "do" };
