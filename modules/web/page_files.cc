@@ -64,7 +64,7 @@ WebAnswer AnswerFile(const Page& page, const WebRequest& request, const std::str
   if (request.method != "GET") {
     return {405, "text/plain; charset=utf-8", "Only GET and HEAD.\n"};
   }
-  const auto found = page.find(request.target);
+  const auto found = page.find(request.target.substr(0, request.target.find('?')));
   if (found == page.end()) {
     return {404, "text/plain; charset=utf-8", "There is no such file.\n"};
   }

@@ -25,6 +25,7 @@ using Page = std::map<std::string, PageFile>;
 Page ReadPage(const std::filesystem::path& folder, const std::string& mend);
 
 // Answers a GET with the file, with `policy` as its Content-Security-Policy; else with 404 or 405.
+// What follows a "?" is ignored: readers of QR codes and messengers append to links.
 WebAnswer AnswerFile(const Page& page, const WebRequest& request, const std::string& policy);
 
 }  // namespace pangea::web

@@ -39,6 +39,16 @@ TEST(PageFiles, APageIsReadOnceAndNothingElse) {
   EXPECT_EQ(AnswerFile(page, {"POST", "/", "", "", ""}, "").status, 405);
 }
 
+TEST(PageFiles, WhatOthersAppendToALinkIsIgnored) {
+  const Page page = ReadPage(MakePage(), "");
+  for (const char* target : {"/?v=2", "/?", "/index.html?utm_source=qr&a=/b?c"}) {
+    const WebAnswer answer = AnswerFile(page, {"GET", target, "", "", ""}, "");
+    EXPECT_EQ(answer.status, 200) << target;
+    EXPECT_EQ(answer.file ? *answer.file : "", "<p>") << target;
+  }
+  EXPECT_EQ(AnswerFile(page, {"GET", "/late.html?v=2", "", "", ""}, "").status, 404);
+}
+
 TEST(PageFiles, SaysHowToMakeAPageThatIsNotThere) {
   try {
     ReadPage(MakePage() / "assets", "build it");
