@@ -129,7 +129,7 @@ TEST_F(GatewayProgram, InvitesNobodyWhoseNameIsNotUtf8) {
   Start();
   const auto [status, said] = Invite("--name \"$(printf 'Ann\\303')\"");
   EXPECT_EQ(status, 1);
-  EXPECT_EQ(said, "pangea-gateway: --name: give at most 60 bytes of UTF-8 that can be shown\n");
+  EXPECT_EQ(said, "pangea-gateway: --name: give at most 120 bytes of UTF-8 that can be shown\n");
   EXPECT_TRUE(fs::is_empty(site_.gateway() / "invites"));
 }
 

@@ -18,10 +18,11 @@ std::string PlainJoinCode(std::string_view text);
 
 struct JoinRequest {
   std::string code;  // as PlainJoinCode returns it
-  std::string name;  // UTF-8 without control characters, at most 60 bytes; may be empty
+  std::string
+      name;  // UTF-8 without control characters, at most kMaxVisitorName bytes; may be empty
 };
 
-inline constexpr size_t kMaxVisitorName = 60;
+inline constexpr size_t kMaxVisitorName = 120;  // 40 characters, also Chinese ones
 // Whether the text may be the name of a person or phone: see JoinRequest::name.
 bool IsVisitorName(std::string_view text);
 

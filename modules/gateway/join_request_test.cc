@@ -64,7 +64,7 @@ TEST(JoinRequest, SaysWhatIsWrong) {
   EXPECT_THAT(Bad(R"({"code": "ABCD"})"), HasSubstr("16 letters"));
   EXPECT_THAT(Bad(R"({"code": "ABCD-EFGH-JKMN-PQRS", "name": "a\nb"})"),
               HasSubstr("cannot be shown"));
-  EXPECT_THAT(Bad(R"({"code": "ABCD-EFGH-JKMN-PQRS", "name": ")" + std::string(61, 'x') + "\"}"),
+  EXPECT_THAT(Bad(R"({"code": "ABCD-EFGH-JKMN-PQRS", "name": ")" + std::string(121, 'x') + "\"}"),
               HasSubstr("too long"));
 }
 
@@ -74,6 +74,11 @@ const char* const kNotUtf8[] = {"\xff", "Ann\xc3", "\xc0\xaf", "\xed\xa0\x80", "
 
 TEST(JoinRequest, ANameIsUtf8) {
   EXPECT_TRUE(IsVisitorName("アンナ"));
+  std::string longest;  // of what fits in the page's field: 40 characters of three bytes
+  for (int i = 0; i < 40; ++i) {
+    longest += "名";
+  }
+  EXPECT_TRUE(IsVisitorName(longest));
   for (const std::string name : kNotUtf8) {
     EXPECT_FALSE(IsVisitorName(name)) << testing::PrintToString(name);
     EXPECT_THAT(Bad(R"({"code": "ABCD-EFGH-JKMN-PQRS", "name": ")" + name + "\"}"),
