@@ -187,6 +187,12 @@ TEST(MachineNames, AreThoseOfThisMachine) {
   EXPECT_THAT(names.addresses, Contains(AddressForOthers(names)));
 }
 
+TEST(MachineNames, WithoutIpv4OthersGetAnIpv6Address) {
+  EXPECT_EQ(ReachableOf({{}, {"127.0.0.1", "::1", "fe80::1", "fd00::7"}}), "fd00::7");
+  EXPECT_EQ(ReachableOf({{}, {"127.0.0.1", "fd00::7", "10.0.0.5"}}), "10.0.0.5");
+  EXPECT_EQ(ReachableOf({{}, {"127.0.0.1", "::1", "fe80::1"}}), "127.0.0.1");
+}
+
 // Browsers look for an address among the certificate's addresses, not among its names.
 TEST(MachineNames, AnAddressThatTheUserGivesIsNoName) {
   MachineNames names;

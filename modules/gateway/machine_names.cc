@@ -7,7 +7,6 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <array>
 #include <memory>
 
@@ -44,22 +43,40 @@ std::vector<std::string> AddressesOfInterfaces() {
   return addresses;
 }
 
-// Asks the kernel from which address a packet to other networks would go; no packet is sent.
-std::string AddressOfRouteOut() {
-  const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  sockaddr_in other{};
-  other.sin_family = AF_INET;
-  other.sin_port = htons(9);
-  inet_pton(AF_INET, "192.0.2.1", &other.sin_addr);  // for documentation only (RFC 5737)
-  sockaddr_in own{};
-  socklen_t size = sizeof(own);
-  const bool known = fd >= 0 &&
-                     connect(fd, reinterpret_cast<sockaddr*>(&other), sizeof(other)) == 0 &&
-                     getsockname(fd, reinterpret_cast<sockaddr*>(&own), &size) == 0;
+// Asks the kernel from which address a packet to this one would go; no packet is sent. Empty if
+// there is no route.
+std::string AddressOfRouteTo(const sockaddr& other, socklen_t size) {
+  const int fd = socket(other.sa_family, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  sockaddr_storage own{};
+  socklen_t own_size = sizeof(own);
+  const bool known = fd >= 0 && connect(fd, &other, size) == 0 &&
+                     getsockname(fd, reinterpret_cast<sockaddr*>(&own), &own_size) == 0;
   if (fd >= 0) {
     close(fd);
   }
-  return known ? TextOf(reinterpret_cast<sockaddr&>(own), sizeof(own)) : "";
+  return known ? TextOf(reinterpret_cast<sockaddr&>(own), own_size) : "";
+}
+
+// To addresses that are for documentation only (RFC 5737, RFC 3849).
+std::string AddressOfRouteOut() {
+  sockaddr_in v4{};
+  v4.sin_family = AF_INET;
+  v4.sin_port = htons(9);
+  inet_pton(AF_INET, "192.0.2.1", &v4.sin_addr);
+  if (std::string own = AddressOfRouteTo(reinterpret_cast<sockaddr&>(v4), sizeof(v4));
+      !own.empty()) {
+    return own;
+  }
+  sockaddr_in6 v6{};
+  v6.sin6_family = AF_INET6;
+  v6.sin6_port = htons(9);
+  inet_pton(AF_INET6, "2001:db8::1", &v6.sin6_addr);
+  return AddressOfRouteTo(reinterpret_cast<sockaddr&>(v6), sizeof(v6));
+}
+
+// A link-local IPv6 address is of no use: browsers do not take its interface.
+bool IsForOthers(const std::string& address) {
+  return !address.starts_with("127.") && address != "::1" && !address.starts_with("fe80:");
 }
 
 }  // namespace
@@ -83,13 +100,31 @@ void AddTo(MachineNames* names, const std::string& host) {
 }
 
 std::string AddressForOthers(const MachineNames& names) {
-  if (std::string address = AddressOfRouteOut(); !address.empty()) {
-    return address;
+  std::string address = AddressOfRouteOut();
+  return address.empty() ? ReachableOf(names) : address;
+}
+
+std::string ReachableOf(const MachineNames& names) {
+  const auto is_v6 = [](const std::string& address) {
+    return address.find(':') != std::string::npos;
+  };
+  for (const bool v6 : {false, true}) {
+    for (const std::string& address : names.addresses) {
+      if (is_v6(address) == v6 && IsForOthers(address)) {
+        return address;
+      }
+    }
   }
-  const auto found = std::ranges::find_if(names.addresses, [](const std::string& address) {
-    return address.find(':') == std::string::npos && !address.starts_with("127.");
-  });
-  return found == names.addresses.end() ? "127.0.0.1" : *found;
+  return "127.0.0.1";
+}
+
+std::string AnyAddress() {
+  const int fd = socket(AF_INET6, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  if (fd < 0) {
+    return "0.0.0.0";
+  }
+  close(fd);
+  return "::";
 }
 
 }  // namespace pangea

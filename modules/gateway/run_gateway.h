@@ -6,13 +6,14 @@
 #include <vector>
 
 #include "gateway/gateway_process.h"
+#include "gateway/machine_names.h"
 
 namespace pangea {
 
 struct GatewayArguments {
   std::string site;
   std::string bus, link;  // LCM URLs; empty: those of the site
-  web::WebOptions web{"0.0.0.0", 8443, {}};
+  web::WebOptions web{AnyAddress(), 8443, {}};
   std::string certificate, key;  // files; empty: the gateway's own authority
   std::string page;              // folder; empty: the installed one
   std::vector<std::string> hosts;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <openssl/ssl.h>
 
+#include <boost/asio/ip/v6_only.hpp>
 #include <chrono>
 #include <stdexcept>
 
@@ -62,6 +63,9 @@ void WebServer::Impl::Listen() {
   acceptor.open(endpoint.protocol(), error);
   if (!error) {
     acceptor.set_option(asio::socket_base::reuse_address(true), error);
+  }
+  if (!error && address.is_v6() && address.is_unspecified()) {
+    acceptor.set_option(asio::ip::v6_only(false), error);  // IPv4 too, also where a sysctl says no
   }
   if (!error) {
     acceptor.bind(endpoint, error);
