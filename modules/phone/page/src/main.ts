@@ -52,9 +52,7 @@ function onRecorded(recorder: Recorder) {
 // Tells the visitor why it failed.
 function attempt(what: Promise<void>): Promise<void> {
   clearNotice();
-  return what.catch((error: Error) => {
-    notice(error.name === "NotAllowedError" ? "The browser does not let the page use the camera: allow it in its settings." : error.message);
-  });
+  return what.catch(({ message }: Error) => notice(message));
 }
 
 // --- buttons and taps

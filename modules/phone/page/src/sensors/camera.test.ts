@@ -71,6 +71,15 @@ test("the focus is locked, but in a dim room the image does not become darker", 
   assert.deepEqual(lens, { focus: "manual", gain: 16 });
 });
 
+test("a camera that another app uses is named, not the browser's error", async () => {
+  installBrowser(async () => {});
+  const getUserMedia = async () => {
+    throw new DOMException("Could not start video source", "NotReadableError");
+  };
+  Object.defineProperty(globalThis, "navigator", { value: { mediaDevices: { getUserMedia } }, configurable: true });
+  await assert.rejects(Camera.open(), /close the app or tab that uses it/);
+});
+
 test("a page that the browser does not trust is told why there is no camera", async () => {
   installBrowser(async () => {});
   Object.defineProperty(globalThis, "navigator", { value: {}, configurable: true });

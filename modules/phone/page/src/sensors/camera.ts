@@ -11,6 +11,13 @@ export interface CameraImage extends Picture {
 
 const kSettle_ms = 1500; // time for the focus to settle before it is locked
 
+// What the visitor reads in place of the browser's text, by the error's name.
+const kWhyNot = new Map([
+  ["NotAllowedError", "The browser does not let the page use the camera: allow it in its settings."],
+  ["NotFoundError", "The browser finds no camera. Is it allowed to use one?"],
+  ["NotReadableError", "The camera cannot be used: close the app or tab that uses it."],
+]);
+
 // A class of Chromium that TypeScript's library lacks.
 declare class MediaStreamTrackProcessor {
   constructor(init: { track: MediaStreamTrack; maxBufferSize?: number });
@@ -31,7 +38,7 @@ export class Camera {
     });
   }
 
-  // Throws the browser's error: no camera, no permission.
+  // Throws an error with a text for the visitor: no camera, no permission.
   static async open(): Promise<Camera> {
     if (!navigator.mediaDevices) {
       throw new Error("The browser gives this page no camera: trust its certificate, or open it in Chrome or Safari.");
@@ -39,6 +46,8 @@ export class Camera {
     const stream = await navigator.mediaDevices.getUserMedia({
       audio: false,
       video: { facingMode: "environment", width: { ideal: 640 }, height: { ideal: 480 }, frameRate: { ideal: 30 } },
+    }).catch(({ name, message }: Error) => {
+      throw new Error(kWhyNot.get(name) ?? message);
     });
     const video = document.createElement("video");
     video.playsInline = video.muted = true;
