@@ -5,10 +5,11 @@ import { readFile } from "node:fs/promises";
 import { extname, join } from "node:path";
 import { fileURLToPath } from "node:url";
 import { WebSocketServer } from "ws";
-import { options } from "../../../viewer/page/test/harness.mjs";
+import { becomes, check, options } from "../../../viewer/page/test/harness.mjs";
 
 const kTypes = { ".html": "text/html", ".js": "text/javascript", ".mjs": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml" };
 export const kFake = fileURLToPath(new URL("fake_agent.mjs", import.meta.url));
+export const kCameras = ["--use-fake-device-for-media-stream", "--use-fake-ui-for-media-stream"];
 const kAgents = { agents: [{ agent: 2, name: "Anna", connected: true }, { agent: 3, name: "Ben", connected: true }] };
 
 // Refuses the first upload and keeps the second one.
@@ -63,4 +64,61 @@ export async function senseMotion(page) {
   for (const [type, x, y, z] of readings) {
     await devtools.send("Emulation.setSensorOverrideReadings", { type, reading: { xyz: { x, y, z } } });
   }
+}
+
+// Chromium warns of an image that is in the page's hands when the page is closed.
+export async function stopAndClose(page) {
+  await page.evaluate(() => document.getElementById("stop").click());
+  await page.waitForFunction(() => document.getElementById("welcome").checkVisibility());
+  await page.close();
+}
+
+// One image that the browser cannot read must not stop the camera.
+export async function testBrokenImage(page) {
+  await page.evaluate(() => {
+    const { createImageBitmap } = window;
+    window.createImageBitmap = async () => {
+      Object.assign(window, { createImageBitmap, imagesBefore: pangea.walk.numImages });
+      throw new Error("this image is broken");
+    };
+  });
+  await becomes(page, "a broken image is left out", () => pangea.walk.numImages > window.imagesBefore + 5);
+}
+
+// Keeps the streams of cameras, and counts the requests to keep the screen on; `whileOpening` is called while one is being opened. `lacks`: what the browser does not have.
+export function watchCameras({ lacks = [] }) {
+  for (const name of lacks) delete window[name];
+  const devices = navigator.mediaDevices;
+  const open = devices.getUserMedia.bind(devices);
+  window.streams = [];
+  devices.getUserMedia = async (wanted) => {
+    const stream = await open(wanted);
+    window.streams.push(stream);
+    window.whileOpening?.();
+    return stream;
+  };
+  window.numCameras = () => window.streams.filter(({ active }) => active).length;
+  const locks = new Set();
+  window.numAwake = () => locks.size;
+  const request = async () => {
+    const lock = { release: async () => void locks.delete(lock) };
+    locks.add(lock);
+    return lock;
+  };
+  Object.defineProperty(navigator, "wakeLock", { value: { request } });
+  // A hidden page loses its lock.
+  window.hide = (hidden) => {
+    if (hidden) locks.clear();
+    Object.defineProperty(document, "hidden", { value: hidden, configurable: true });
+    document.dispatchEvent(new Event("visibilitychange"));
+  };
+  window.rotate = () => screen.orientation.dispatchEvent(new Event("change"));
+}
+
+// The agent of the walk is a new one, and it is the only one.
+export async function hasOneNewAgent(page, what) {
+  await becomes(page, what, () => !pangea.walk?.isOld && pangea.walk?.vio?.counters.images > 2);
+  check("with one agent and one camera", page.workers().length === 1 && (await page.evaluate(() => numCameras())) === 1,
+    `${page.workers().length}, ${await page.evaluate(() => numCameras())}`);
+  await page.evaluate(() => (pangea.walk.isOld = true));
 }

@@ -1,11 +1,11 @@
-// Tests of the page on a device with its own odometry, which fake_xr.mjs fakes.
+// Tests the page as page_test.mjs does, on a device with its own odometry, which fake_xr.mjs fakes.
 
-import { becomes, check, openPage } from "../../../viewer/page/test/harness.mjs";
+import { becomes, check, launch, openPage, run } from "../../../viewer/page/test/harness.mjs";
 import { installFakeXr, projectionOf } from "./fake_xr.mjs";
-import { screenshot, senseMotion, told } from "./page_tools.mjs";
+import { kCameras, screenshot, senseMotion, serve, told } from "./page_tools.mjs";
 
 // A device with its own odometry looks along odom's y from a height of 1.5 m; the lower and the right part of its image are darker.
-export async function testXr(browser, url) {
+async function testXr(browser, url) {
   const page = await openPage(browser, url, { viewport: { width: 360, height: 480 }, permissions: ["camera", "accelerometer", "gyroscope"] }, async (page) => {
     await page.addInitScript(installFakeXr, { frame_ms: 33 });
     await page.addInitScript(countSamplers);
@@ -89,7 +89,7 @@ async function testXrRotations(page) {
   check("with one agent", page.workers().length === 1, page.workers().length);
 }
 
-export async function testXrRefused(browser, url) {
+async function testXrRefused(browser, url) {
   const page = await openPage(browser, url, { viewport: { width: 360, height: 480 }, permissions: ["camera", "accelerometer", "gyroscope"] }, (page) => page.addInitScript(installFakeXr, { frame_ms: 33, refusedFeature: "camera-access" }));
   await senseMotion(page);
   await page.locator("#start").click();
@@ -98,7 +98,7 @@ export async function testXrRefused(browser, url) {
 }
 
 // AR starts, but gives no camera images.
-export async function testXrBlind(browser, url) {
+async function testXrBlind(browser, url) {
   const page = await openPage(browser, url, { viewport: { width: 360, height: 480 }, permissions: ["camera", "accelerometer", "gyroscope"] }, (page) => page.addInitScript(installFakeXr, { frame_ms: 33 }));
   await senseMotion(page);
   await page.evaluate((projection) => {
@@ -112,3 +112,12 @@ export async function testXrBlind(browser, url) {
   await becomes(page, "the next start uses the page's own odometry", () => Boolean(pangea.calibration));
   await page.close();
 }
+
+await run(async () => {
+  const url = await serve();
+  const browser = await launch(kCameras);
+  await testXr(browser, url);
+  await testXrRefused(browser, url);
+  await testXrBlind(browser, url);
+  await browser.close();
+});
