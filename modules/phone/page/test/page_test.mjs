@@ -13,6 +13,10 @@ async function testLive(browser, url) {
   const page = await openPage(browser, url, { ...kPhone, hasTouch: true });
   await screenshot(page, "welcome");
   check("nothing is wider than a phone", await page.evaluate(() => document.documentElement.scrollWidth <= 360));
+  await page.setViewportSize({ width: 320, height: 454 });
+  const bottom = await page.evaluate(() => document.getElementById("welcome").getBoundingClientRect().bottom);
+  check("nothing of the panel is below a small phone's screen", bottom <= 454, bottom);
+  await page.setViewportSize(kPhone.viewport);
   await senseMotion(page);
   await page.locator("#start").click();
   await testCalibration(page);
