@@ -37,6 +37,7 @@ function onEnter() {
 
 function onLeave() {
   panels.hide();
+  welcome.isRefused = visit.walk?.link === "refused";
   welcome.show();
 }
 

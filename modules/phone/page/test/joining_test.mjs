@@ -4,7 +4,7 @@ import { readFile } from "node:fs/promises";
 import { unzipSync } from "fflate";
 import { becomes, check, launch, openPage, run } from "../../../viewer/page/test/harness.mjs";
 import {
-  hasOneNewAgent, kCameras, kFake, kPhone, screenshot, senseMotion, serve, stopAndClose, testBrokenImage, uploads, watchCameras,
+  hasOneNewAgent, kCameras, kFake, kPhone, kRevoked, screenshot, senseMotion, serve, stopAndClose, testBrokenImage, uploads, watchCameras,
 } from "./page_tools.mjs";
 
 // The visitor taps Start twice, and the browser stores nothing and gives images as Safari does. The code of the invite works only once.
@@ -107,6 +107,28 @@ const leaveUnsent = (page, spool) => page.evaluate((name) => new Promise((done) 
   };
 }), spool);
 
+// A member whose key was revoked can enter the code of a new invite, without leaving first.
+async function testRevoked(browser, url) {
+  const page = await openPage(browser, url, kPhone);
+  await page.evaluate(([agent, key]) => localStorage.setItem("pangea.membership", JSON.stringify({ agent, key, site: "hall", name: "Eva" })),
+    [kRevoked, "ab".repeat(32)]);
+  await page.reload();
+  await senseMotion(page);
+  await page.locator("#start").click();
+  await page.locator("#skip").click();
+  await becomes(page, "a member who was revoked is told so", () => /does not know this phone/.test(document.getElementById("hint").textContent));
+  await page.locator("#stop").click();
+  check("and may enter a new code", await page.locator("#code").isVisible(), await page.locator("#invitation").textContent());
+  await page.locator("#code").fill("ABCD-EFGH-JKMN-PQRS");
+  await page.locator("#start").click();
+  await becomes(page, "which must be valid", () => /This code is not known/.test(document.getElementById("notice").textContent));
+  await page.route("**/v1/join", (route) => route.fulfill({ json: { agent: 2, key: "cd".repeat(32), site: "hall" } }));
+  await page.locator("#start").click();
+  await page.locator("#skip").click();
+  await becomes(page, "then it is a new member", () => pangea.walk?.membership?.agent === 2);
+  await stopAndClose(page);
+}
+
 // Another tab, which the phone has suspended, holds the storage of an earlier agent.
 async function testOtherTab(browser, url) {
   const tab = await openPage(browser, url, kPhone);
@@ -163,6 +185,7 @@ await run(async () => {
   await testJoining(browser, url);
   await testUpload(browser, url);
   await testMembers(browser, url);
+  await testRevoked(browser, url);
   await testOtherTab(browser, url);
   await testLeaving(browser, url);
   await testRefusals(browser, url);

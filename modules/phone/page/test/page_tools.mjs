@@ -9,6 +9,7 @@ import { becomes, check, options } from "../../../viewer/page/test/harness.mjs";
 
 const kTypes = { ".html": "text/html", ".js": "text/javascript", ".mjs": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml" };
 export const kFake = fileURLToPath(new URL("fake_agent.mjs", import.meta.url));
+export const kRevoked = 9; // an agent whose key the server does not know
 export const kCameras = ["--use-fake-device-for-media-stream", "--use-fake-ui-for-media-stream"];
 const kAgents = { agents: [{ agent: 2, name: "Anna", connected: true }, { agent: 3, name: "Ben", connected: true }] };
 
@@ -45,6 +46,7 @@ export async function serve() {
   new WebSocketServer({ server }).on("connection", (socket, { url }) => {
     socket.send(Buffer.alloc(32));
     if (url.startsWith("/recording")) takeUploads(socket);
+    if (url.endsWith(`=${kRevoked}`)) socket.close(4401);
   });
   await new Promise((done) => server.listen(0, "127.0.0.1", done));
   return `http://localhost:${server.address().port}/`;

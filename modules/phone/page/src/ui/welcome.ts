@@ -20,6 +20,7 @@ const codeField = () => byId<HTMLInputElement>("code");
 
 export class Welcome {
   membership: Membership | undefined = storedMembership();
+  isRefused = false; // the server does not know this phone any more
   private joining?: Promise<void>;
 
   constructor() {
@@ -47,12 +48,13 @@ export class Welcome {
     if (code === "") return;
     try {
       this.membership = await join(code, byId<HTMLInputElement>("name").value.trim());
+      this.isRefused = false;
       if (!keepMembership(this.membership)) notice("This browser does not keep your key: it is lost when you close the page.");
       // The keyframes of an earlier agent cannot be sent without its key; another site may have given the same id.
       await SpoolStore.removeAll().catch(() => {});
     } catch (error) {
       // A member who scans the code of the invite once more.
-      if (!(error instanceof CodeRefused) || !this.membership) throw error;
+      if (!(error instanceof CodeRefused) || !this.membership || this.isRefused) throw error;
       notice(`You go on as ${nameOf(this.membership)}: this code is not valid any more.`);
     }
     // A reloaded page must not offer the code again.
@@ -63,13 +65,15 @@ export class Welcome {
   show() {
     const code = codeIn(location.hash);
     if (code) codeField().value = code;
-    const member = code ? undefined : this.membership;
+    const member = code || this.isRefused ? undefined : this.membership;
     byId("name_row").hidden = byId("code_row").hidden = member !== undefined;
     byId("forget").hidden = !this.membership;
     byId("recalibrate").hidden = storedCalibrations() === 0;
     byId("invitation").textContent = member
       ? `You are ${nameOf(member)}${member.site ? ` at ${member.site}` : ""}.`
-      : code ? "You are invited." : "With an invite code you join others. Without one, the phone tracks by itself.";
+      : code ? "You are invited."
+      : this.isRefused ? "The server does not know this phone any more: enter the code of a new invite."
+      : "With an invite code you join others. Without one, the phone tracks by itself.";
     byId("welcome").hidden = false;
   }
 
