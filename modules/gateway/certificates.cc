@@ -238,6 +238,12 @@ MadeCertificate MakeServerCertificate(const Identity& authority, const MachineNa
   return made;
 }
 
+bool IsFor(const std::string& certificate_pem, const std::string& name) {
+  const Certificate certificate = ReadCertificate(certificate_pem);
+  return X509_check_host(certificate.get(), name.data(), name.size(), 0, nullptr) == 1 ||
+         X509_check_ip_asc(certificate.get(), name.c_str(), 0) == 1;
+}
+
 bool IsGoodFor(const Identity& server, const Identity& authority, const MachineNames& names,
                int64_t now_s, int days) {
   try {

@@ -45,6 +45,9 @@ MadeCertificate MakeServerCertificate(const Identity& authority, const MachineNa
 bool IsGoodFor(const Identity& server, const Identity& authority, const MachineNames& names,
                int64_t now_s, int days);
 
+// Whether browsers accept the first certificate in the text for this name or address. Throws as
+// Fingerprint does.
+bool IsFor(const std::string& certificate_pem, const std::string& name);
 // SHA-256 of the first certificate in the text, as "AB:CD:...". Throws std::runtime_error if there
 // is none.
 std::string Fingerprint(const std::string& certificate_pem);

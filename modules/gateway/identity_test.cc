@@ -203,5 +203,18 @@ TEST(MachineNames, AnAddressThatTheUserGivesIsNoName) {
   EXPECT_THAT(names.addresses, ElementsAre("192.168.77.7", "fd00::9"));
 }
 
+TEST(Certificates, AreForTheirNamesAndAddresses) {
+  const MachineNames names{{"hall.example.org"}, {"192.168.77.7", "fd00::9"}};
+  const Identity authority = MakeAuthority("Pangea", names, kIssued_s);
+  const std::string made =
+      MakeServerCertificate(authority, names, kIssued_s).identity.certificate_chain_pem;
+  for (const char* name : {"hall.example.org", "192.168.77.7", "fd00::9"}) {
+    EXPECT_TRUE(IsFor(made, name)) << name;
+  }
+  for (const char* name : {"example.org", "192.168.77.8", "::1", "127.0.0.1"}) {
+    EXPECT_FALSE(IsFor(made, name)) << name;
+  }
+}
+
 }  // namespace
 }  // namespace pangea

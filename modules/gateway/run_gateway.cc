@@ -47,12 +47,18 @@ web::Page PageOf(const std::string& folder) {
 }
 
 GatewayIdentity IdentityOf(const GatewayArguments& arguments, const site::Site& site,
-                           const MachineNames& names) {
+                           const MachineNames& names, const std::string& url_host) {
   if (arguments.certificate.empty() != arguments.key.empty()) {
     throw std::runtime_error("give --cert and --key together");
   }
   if (!arguments.certificate.empty()) {
-    return ReadIdentity(arguments.certificate, arguments.key);
+    GatewayIdentity own = ReadIdentity(arguments.certificate, arguments.key);
+    if (!IsFor(own.server.certificate_chain_pem, url_host)) {
+      std::cout << fmt::format(
+          "{} is not in the certificate: browsers refuse the link; give a --host that is\n",
+          url_host);
+    }
+    return own;
   }
   GatewayIdentity identity = OpenIdentity(site, names, std::time(nullptr));
   for (const std::string& name : identity.left_out) {
@@ -93,8 +99,9 @@ void RunGateway(const GatewayArguments& arguments) {
   LcmBus link_bus(buses.link, LcmBus::Fragments::kRefused);
   LcmBus server_bus(buses.bus);
   MakeGatewayFolders(site);
+  const std::string url_host = UrlHost(arguments, names);
   GatewayProcess::Options options{arguments.web, PageOf(arguments.page),
-                                  IdentityOf(arguments, site, names), UrlHost(arguments, names),
+                                  IdentityOf(arguments, site, names, url_host), url_host,
                                   static_cast<int64_t>(1e9 * arguments.recordings_gb)};
   options.web.names = names.hosts;
   GatewayProcess process(link_bus, server_bus, site, options);
