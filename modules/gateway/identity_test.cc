@@ -201,6 +201,10 @@ TEST(MachineNames, AnAddressThatTheUserGivesIsNoName) {
   }
   EXPECT_THAT(names.hosts, ElementsAre("hall.example.org"));
   EXPECT_THAT(names.addresses, ElementsAre("192.168.77.7", "fd00::9"));
+  for (const char* more :
+       {"https://hall.example.org", "hall.example.org:443", "hall.example.org/"}) {
+    EXPECT_THROW(AddTo(&names, more), std::runtime_error) << more;
+  }
 }
 
 TEST(Certificates, AreForTheirNamesAndAddresses) {

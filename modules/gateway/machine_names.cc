@@ -1,14 +1,18 @@
 #include "gateway/machine_names.h"
 
 #include <arpa/inet.h>
+#include <fmt/format.h>
 #include <ifaddrs.h>
 #include <net/if.h>
 #include <netdb.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
+#include <cctype>
 #include <memory>
+#include <stdexcept>
 
 namespace pangea {
 namespace {
@@ -96,6 +100,12 @@ void AddTo(MachineNames* names, const std::string& host) {
   std::array<unsigned char, sizeof(in6_addr)> bytes{};
   const bool is_address = inet_pton(AF_INET, host.c_str(), bytes.data()) == 1 ||
                           inet_pton(AF_INET6, host.c_str(), bytes.data()) == 1;
+  if (!is_address && !std::ranges::all_of(host, [](unsigned char c) {
+        return std::isalnum(c) != 0 || c == '.' || c == '-' || c == '_';
+      })) {
+    throw std::runtime_error(
+        fmt::format("--host {}: give a name or an address alone, as hall.example.org", host));
+  }
   (is_address ? names->addresses : names->hosts).push_back(host);
 }
 

@@ -11,7 +11,7 @@ namespace pangea {
 // The host name alone and with ".local", "localhost", and the addresses of the interfaces.
 MachineNames NamesOfThisMachine();
 
-// Adds a name or an address that the user has given.
+// Adds a name or an address that the user has given. Throws std::runtime_error if it is neither.
 void AddTo(MachineNames* names, const std::string& host);
 
 // The address of the interface that leads to other networks, else ReachableOf(names).
