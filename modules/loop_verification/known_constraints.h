@@ -9,13 +9,18 @@
 //
 // Nearby constraints are connected to the two keyframes by a few metres of odometry. Each gives the
 // relative position with the variance sigma^2 + (drift * path)^2; their information is added as if
-// they were independent, although they share odometry. A new constraint with their median sigma
-// would add 0.5 * log2(1 + I_new / I_known) bits to each coordinate. If this gain is small, the
-// candidate is redundant. The first constraints between two maps are never redundant: the decision
-// to merge the maps depends on them. The first nearby constraints within a map are not redundant
-// either: a single wrong one would displace the map, and only others can reveal it.
+// they were independent, although they share odometry. So is that through each third map: from the
+// query to its map's last match there, and from there to the candidate's match. The variances
+// before and after a new constraint with the median sigma give the bits that it would add to each
+// coordinate. Where third maps help, both contain a tolerance: what no user would notice does not
+// count. If this gain is small, the candidate is redundant. The first constraints between two maps
+// are never redundant: the decision to merge the maps depends on them. The first nearby constraints
+// within a map are not redundant either: a single wrong one would displace the map, and only others
+// can reveal it.
 
 #include <map>
+#include <optional>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -70,6 +75,19 @@ class KnownConstraints {
     bool query_is_a = false;
     double sigma_m = 0;  // of the position, in the worst direction
   };
+  // What constraints near both keyframes tell of their relative position.
+  struct Knowledge {
+    double information = 0;  // of each coordinate, 1/m^2
+    std::vector<double> sigmas;
+  };
+  Knowledge KnowledgeOf(const KeyframeId& query, const KeyframeId& match,
+                        const KeyframeStore& store) const;
+  // The keyframe of the third map that the latest query of this map before this one matched, if it
+  // is near. So all constraints that KnowledgeOf uses on the way there precede the candidate.
+  std::optional<KeyframeId> LastMatchIn(const MapId& third, const KeyframeId& query) const;
+  std::vector<KeyframeId> WaysThroughThirdMaps(const KeyframeId& query,
+                                               const KeyframeId& match) const;
+  void NoteNeighbours(const MapId& a, const MapId& b);
   using BySeq = std::multimap<int32_t, Known>;  // key: seq_a
   // The accepted constraints between the candidate's maps; null if there are none.
   const BySeq* Between(const KeyframeId& query, const KeyframeId& match) const;
@@ -79,6 +97,7 @@ class KnownConstraints {
 
   KnownConstraintOptions options_;
   std::map<std::pair<MapId, MapId>, BySeq> by_maps_;
+  std::map<MapId, std::set<MapId>> neighbours_;  // of each map, those with constraints to it
 };
 
 }  // namespace pangea

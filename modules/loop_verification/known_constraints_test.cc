@@ -10,6 +10,7 @@ namespace {
 constexpr double kStep_m = 0.5;
 const MapId kA{1, 1'000'000};
 const MapId kB{2, 2'000'000};
+const MapId kC{3, 3'000'000};
 
 // Keyframes in a row, with distances of kStep_m.
 void AddRow(const MapId& map, int count, KeyframeStore* store) {
@@ -40,6 +41,7 @@ class KnownConstraintsTest : public testing::Test {
   KnownConstraintsTest() {
     AddRow(kA, 80, &store_);
     AddRow(kB, 80, &store_);
+    AddRow(kC, 80, &store_);
   }
 
   double GainBits(const KeyframeId& query, const KeyframeId& match) const {
@@ -75,6 +77,42 @@ TEST_F(KnownConstraintsTest, OdometryBetweenAddsItsDriftOnBothSides) {
   EXPECT_NEAR(GainBits({kB, 12}, {kA, 9}), expected, 1e-9);
   EXPECT_TRUE(known_.IsRedundant({kB, 11}, {kA, 11}, store_));
   EXPECT_FALSE(known_.IsRedundant({kB, 14}, {kA, 14}, store_));
+}
+
+// One constraint to the third map, and one from there: their variances add, with the odometry.
+TEST_F(KnownConstraintsTest, AThirdMapTellsWhereTheMatchIs) {
+  known_.Add(Accepted({kA, 10}, {kB, 10}, 0.02));
+  known_.Add(Accepted({kB, 12}, {kC, 10}, 0.02));
+  // One step in C, and two in B; one in A.
+  const double near = 0.02 * 0.02 + std::pow(0.02 * kStep_m, 2);
+  const double far = 0.02 * 0.02 + std::pow(0.02 * 3 * kStep_m, 2);
+  const double after = 1 / (1 / (near + far) + 1 / (0.02 * 0.02));
+  const double tolerance = 0.01 * 0.01;
+  EXPECT_NEAR(GainBits({kC, 11}, {kA, 11}),
+              0.5 * std::log2((near + far + tolerance) / (after + tolerance)), 1e-9);
+  EXPECT_TRUE(std::isinf(GainBits({kC, 10}, {kA, 11}))) << "of the same query";
+  EXPECT_TRUE(std::isinf(GainBits({kC, 11}, {kA, 60}))) << "too far away";
+}
+
+// The candidate may be decided before these.
+TEST_F(KnownConstraintsTest, OnlyWhatTheWayThroughAThirdMapRestsOnCounts) {
+  known_.Add(Accepted({kA, 10}, {kB, 13}, 0.02));
+  known_.Add(Accepted({kB, 12}, {kC, 10}, 0.02));
+  EXPECT_TRUE(std::isinf(GainBits({kC, 11}, {kA, 11}))) << "C's match does not rest on B's query";
+  known_.Add(Accepted({kC, 9}, {kB, 20}, 0.02));
+  EXPECT_TRUE(std::isinf(GainBits({kC, 11}, {kA, 11}))) << "C's keyframe was not the query";
+}
+
+TEST_F(KnownConstraintsTest, WhatIsSavedAndRestoredDecidesTheSame) {
+  known_.Add(Accepted({kA, 10}, {kB, 10}, 0.02));
+  known_.Add(Accepted({kB, 12}, {kC, 10}, 0.02));
+  const double gain = GainBits({kC, 11}, {kA, 11});
+  ByteRecordWriter writer;
+  known_.Save(&writer);
+  const std::vector<uint8_t> bytes = writer.Take();
+  ByteRecordReader reader(bytes);
+  known_.Restore(&reader);
+  EXPECT_EQ(GainBits({kC, 11}, {kA, 11}), gain);
 }
 
 // Otherwise the decision would depend on the order of verification.
