@@ -19,6 +19,7 @@
 #include "bench/recognition/input.h"
 #include "bench/visits/server.h"
 #include "bench/visits/visit.h"
+#include "bus/process.h"
 #include "eval/metrics.h"
 
 namespace pangea::bench {
@@ -197,6 +198,7 @@ int main(int argc, char** argv) {
   app.add_option("--thin-every", thin_every, "visits between thinnings; 0: never")
       ->capture_default_str();
   CLI11_PARSE(app, argc, argv);
+  pangea::UseOneThread();
   try {
     pangea::bench::Bench bench(pangea::bench::ReadRecordings(logs, truths));
     pangea::bench::PrintHead();
