@@ -54,6 +54,16 @@ class Access : public testing::Test {
     return "";
   }
 
+  static bool Hears(SiteStreams& streams, SiteStreams::Kind kind) {
+    for (int i = 0; i < 100; ++i) {
+      if (streams.HeardOfStored(kind)) {
+        return true;
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    return false;
+  }
+
   const fs::path folder_ = fs::path(testing::TempDir()) / "cluster_access";
   const int port_ = FreePort();
   const std::string host_, place_;
@@ -116,6 +126,8 @@ TEST_F(Access, AWorkerStoresResultsAndNothingElse) {
   const std::vector<uint8_t> data{1, 2, 3};
   ASSERT_EQ(core.StoreEvent("OPTIONS_fusion", 7, data, 0).stored, SiteStreams::Stored::kNew);
   SiteStreams worker(As("worker"), "hall");
+  worker.ListenToStored(SiteStreams::Kind::kMatch);
+  core.ListenToStored(SiteStreams::Kind::kResult);
   EXPECT_TRUE(worker.AreThere());
   Constraint result;
   result.from = {{1, 5}, 3};
@@ -131,6 +143,8 @@ TEST_F(Access, AWorkerStoresResultsAndNothingElse) {
   EXPECT_EQ(core.JournalEnd(), 1u);
   EXPECT_EQ(core.LeaseSequence(), 0u);
   EXPECT_EQ(core.Store(core.EntryOf(match)), SiteStreams::Stored::kNew);
+  EXPECT_TRUE(Hears(worker, SiteStreams::Kind::kMatch));
+  EXPECT_TRUE(Hears(core, SiteStreams::Kind::kResult));
   const auto delivery = worker.FetchMatch();
   ASSERT_TRUE(delivery.has_value());
   EXPECT_TRUE(worker.Acknowledge(delivery->ack_subject));

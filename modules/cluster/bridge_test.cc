@@ -236,6 +236,23 @@ TEST_F(Bridge, NatsThatIsKilledAndStartsAgainLosesNothing) {
   ExpectEachResultOnce();
 }
 
+// A hundred agents' sites share the NATS servers.
+TEST_F(Bridge, AsksNatsSeldomWhileNothingIsStored) {
+  AddWorker();
+  AddKeyframes(4, 2);
+  ASSERT_TRUE(Until([&] { return server_->has_all() && QueueIsEmpty(); }));
+  Until([] { return false; }, 0.5);
+  NatsClient listener(nats_->access(), "test");
+  listener.Listen("$JS.API.>");
+  Until([] { return false; }, 2);
+  int questions = 0;
+  while (listener.NextHeard("$JS.API.>")) {
+    ++questions;
+  }
+  EXPECT_GT(questions, 4) << "what others say may be lost";
+  EXPECT_LT(questions, 20);
+}
+
 TEST_F(Bridge, SaysWhatIsWrongWithNats) {
   const auto why = [](const NatsAccess& access, const std::string& site) -> std::string {
     try {

@@ -35,6 +35,7 @@ CoreBridge::CoreBridge(Bus& bus, SiteStreams& streams, SiteLease& lease)
                 .result = std::bind_front(&CoreBridge::OnFormerResult, this)}),
       results_(streams.Results()) {
   streams_.ListenToOptions();
+  streams_.ListenToStored(SiteStreams::Kind::kResult);
   node_.Listen<journal_file_t>(channels::kJournalFile,
                                std::bind_front(&CoreBridge::OnJournalFile, this));
   node_.SubscribeBytes(std::string(channels::kHave),
@@ -118,13 +119,13 @@ void CoreBridge::StoreAll() {
 
 // Not while the journal is being read, because it may already have most of these results.
 void CoreBridge::PublishResults() {
-  if (journal_.reading()) {
-    return;
+  if (streams_.HeardOfStored(SiteStreams::Kind::kResult)) {
+    results_watch_.NoteStored(now_utime_);
   }
-  for (int i = 0; i < kPiece; ++i) {
+  for (int i = 0; i < kPiece && !journal_.reading() && results_watch_.IsDue(now_utime_); ++i) {
     const auto message = results_.Next();
     if (!message) {
-      return;
+      return results_watch_.NoteEmpty(now_utime_);
     }
     constraint_t result{};
     if (!DecodeMessage(message->data, &result)) {

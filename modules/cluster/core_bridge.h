@@ -26,6 +26,7 @@
 #include "cluster/journal_shipper.h"
 #include "cluster/site_lease.h"
 #include "cluster/site_streams.h"
+#include "cluster/stream_watch.h"
 #include "core/server_messages.h"
 #include "journal_follower/journal_follower.h"
 #include "messages/catch_up_messages.h"
@@ -39,7 +40,7 @@ class CoreBridge : public Process {
 
   void Tick(int64_t now_utime) override;
   void BetweenMessages(int64_t now_utime) override;
-  int longest_wait_ms() const override { return 20; }
+  int longest_wait_ms() const override { return results_watch_.longest_wait_ms(now_utime_); }
 
  private:
   static constexpr size_t kMaxUnstored = 5000;
@@ -67,6 +68,7 @@ class CoreBridge : public Process {
   JournalShipper shipper_;
   JournalFollower journal_;
   SiteStreams::Reader results_;
+  StreamWatch results_watch_;
   std::deque<SiteStreams::Entry> to_store_;
   std::set<int64_t> in_journal_;                      // constraint ids
   std::deque<std::pair<KeyframeId, int64_t>> asked_;  // query and constraint id

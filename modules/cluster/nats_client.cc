@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cstdlib>
 #include <functional>
+#include <map>
 #include <sstream>
 #include <stdexcept>
 
@@ -70,7 +71,7 @@ struct NatsClient::Impl {
   std::string url;
   NatsOwned<natsConnection> connection;
   NatsOwned<jsCtx> context;
-  NatsOwned<natsSubscription> heard;
+  std::map<std::string, NatsOwned<natsSubscription>> heard;  // by subject
 
   void Check(natsStatus status, jsErrCode error, const std::string& what) const {
     if (status == NATS_NO_RESPONDERS || error == JSNotEnabledErr) {
@@ -321,17 +322,18 @@ void NatsClient::Listen(const std::string& subject) {
   natsSubscription* subscription = nullptr;
   const natsStatus status =
       natsConnection_SubscribeSync(&subscription, impl_->connection.get(), subject.c_str());
-  impl_->heard.reset(subscription);
+  impl_->heard[subject].reset(subscription);
   impl_->Check(status, jsErrCode(0), subject);
 }
 
-std::optional<std::vector<uint8_t>> NatsClient::NextHeard() {
+std::optional<std::vector<uint8_t>> NatsClient::NextHeard(const std::string& subject) {
+  natsSubscription* const heard = impl_->heard.at(subject).get();
   uint64_t waiting = 0;
-  if (natsSubscription_QueuedMsgs(impl_->heard.get(), &waiting) != NATS_OK || waiting == 0) {
+  if (natsSubscription_QueuedMsgs(heard, &waiting) != NATS_OK || waiting == 0) {
     return std::nullopt;
   }
   natsMsg* got = nullptr;
-  const natsStatus status = natsSubscription_NextMsg(&got, impl_->heard.get(), 1);
+  const natsStatus status = natsSubscription_NextMsg(&got, heard, 1);
   const NatsOwned<natsMsg> message(got);
   return status == NATS_OK ? std::optional(DataOf(got)) : std::nullopt;
 }

@@ -94,11 +94,11 @@ class NatsClient {
   };
   std::optional<QueueState> StateOf(const std::string& stream, const std::string& consumer);
 
-  // Publish reaches only clients that listen now, and may be lost. Listen replaces the subject that
-  // this client listened to before. NextHeard does not wait.
+  // Publish reaches only clients that listen now, and may be lost. NextHeard does not wait;
+  // `subject` as given to Listen.
   void Publish(const std::string& subject, Bytes data);
   void Listen(const std::string& subject);
-  std::optional<std::vector<uint8_t>> NextHeard();
+  std::optional<std::vector<uint8_t>> NextHeard(const std::string& subject);
 
  private:
   struct Impl;

@@ -82,23 +82,42 @@ std::string SiteStreams::HaveSubject() const { return fmt::format("pangea.{}.hav
 
 std::string SiteStreams::LeaseSubject() const { return fmt::format("pangea.{}.lease", site_); }
 
+std::string SiteStreams::StoredSubject(Kind kind) const {
+  const char* const name = kind == Kind::kKeyframe ? "keyframe"
+                           : kind == Kind::kMatch  ? kMatch
+                                                   : kResult;
+  return fmt::format("pangea.{}.stored.{}", site_, name);
+}
+
 std::string SiteStreams::OptionsSubject(const std::string& process) const {
   return fmt::format("pangea.{}.options.{}", site_, process);
 }
 
 SiteStreams::Entry SiteStreams::EntryOf(const PlaceMatch& match) const {
-  return {Subject(kMatch, match.query), EncodeMessage(ToMessage(match))};
+  return {Kind::kMatch, Subject(kMatch, match.query), EncodeMessage(ToMessage(match))};
 }
 
 SiteStreams::Entry SiteStreams::EntryOf(const Constraint& result) const {
-  return {fmt::format("{}.{}", Subject(kResult, result.to), result.Id()),
+  return {Kind::kResult, fmt::format("{}.{}", Subject(kResult, result.to), result.Id()),
           EncodeMessage(ToMessage(result))};
+}
+
+SiteStreams::Stored SiteStreams::Store(const Entry& entry) {
+  const Stored stored = nats_.Store(entry.subject, entry.data, {}).stored;
+  if (stored == Stored::kNew) {
+    nats_.Publish(StoredSubject(entry.kind), {});
+  }
+  return stored;
 }
 
 SiteStreams::StoreAnswer SiteStreams::StoreEvent(const std::string& channel, int64_t utime,
                                                  Bytes data, uint64_t behind) {
-  return nats_.Store(Subject(kJournal, TokensOf(channel, data)), data,
-                     {NatsClient::If::What::kNewestOfStream, behind}, utime);
+  const StoreAnswer answer = nats_.Store(Subject(kJournal, TokensOf(channel, data)), data,
+                                         {NatsClient::If::What::kNewestOfStream, behind}, utime);
+  if (answer.stored == Stored::kNew && channel.starts_with(channels::kKeyframePrefix)) {
+    nats_.Publish(StoredSubject(Kind::kKeyframe), {});
+  }
+  return answer;
 }
 
 SiteStreams::StoreAnswer SiteStreams::StoreTerm(uint64_t term, uint64_t behind) {
@@ -191,6 +210,21 @@ std::optional<std::vector<KeyframeId>> SiteStreams::PendingMatchesOf(const MapId
 
 std::optional<SiteStreams::QueueState> SiteStreams::MatchQueueState() {
   return nats_.StateOf(Stream(kMatch), kWorkers);
+}
+
+void SiteStreams::Nak(const std::string& ack_subject, int64_t delay_us) {
+  nats_.Nak(ack_subject, delay_us);
+  if (delay_us == 0) {
+    nats_.Publish(StoredSubject(Kind::kMatch), {});  // another worker can fetch it
+  }
+}
+
+bool SiteStreams::HeardOfStored(Kind kind) {
+  bool heard = false;
+  while (nats_.NextHeard(StoredSubject(kind))) {
+    heard = true;
+  }
+  return heard;
 }
 
 void SiteStreams::PublishHave(Bytes data) { nats_.Publish(HaveSubject(), data); }

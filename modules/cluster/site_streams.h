@@ -9,6 +9,7 @@
 //   stream pangea-<site>-lease,   subject pangea.<site>.lease: the newest record counts
 //   subject pangea.<site>.have: the newest HAVE, only for clients that listen now
 //   subject pangea.<site>.options.<process>: OPTIONS_<process> of workers
+//   subject pangea.<site>.stored.<kind>: empty; somebody has stored a message (stream_watch.h)
 // The journal's stream has all events of the site's journal in its order; one core at a time writes
 // it (journal_shipper.h). Matches and results have the map and seq of the query, and <id> is the
 // constraint's id. The data are LCM messages. A subject of a match or result has one message:
@@ -43,7 +44,10 @@ class SiteStreams : public LeaseRecords {
   // Whether a core has made the streams.
   bool AreThere() { return nats_.LastSequence(Stream("result")).has_value(); }
 
+  // What readers are told of when it is stored.
+  enum class Kind : uint8_t { kKeyframe, kMatch, kResult };
   struct Entry {
+    Kind kind = Kind::kMatch;
     std::string subject;
     std::vector<uint8_t> data;
   };
@@ -51,7 +55,7 @@ class SiteStreams : public LeaseRecords {
   Entry EntryOf(const Constraint& result) const;
   using Message = NatsClient::Message;
   using Stored = NatsClient::Stored;
-  Stored Store(const Entry& entry) { return nats_.Store(entry.subject, entry.data, {}).stored; }
+  Stored Store(const Entry& entry);
 
   // The site's journal. An event is stored only if the newest one has the sequence `behind`. A term
   // (site_lease.h) is stored as an event of its own.
@@ -104,20 +108,21 @@ class SiteStreams : public LeaseRecords {
   std::optional<Delivery> FetchMatch();
   bool Acknowledge(const std::string& ack_subject) { return nats_.Acknowledge(ack_subject); }
   void InProgress(const std::string& ack_subject) { nats_.InProgress(ack_subject); }
-  void Nak(const std::string& ack_subject, int64_t delay_us = 0) {
-    nats_.Nak(ack_subject, delay_us);
-  }
+  void Nak(const std::string& ack_subject, int64_t delay_us = 0);
   // The queries of this map whose match is in the queue, or taken and not acknowledged. Nothing if
   // NATS does not answer.
   std::optional<std::vector<KeyframeId>> PendingMatchesOf(const MapId& map);
   std::optional<QueueState> MatchQueueState();
 
+  void ListenToStored(Kind kind) { nats_.Listen(StoredSubject(kind)); }
+  // Whether somebody has stored such a message since the last call.
+  bool HeardOfStored(Kind kind);
   void PublishHave(Bytes data);
   void ListenToHave();
-  std::optional<std::vector<uint8_t>> NextHave() { return nats_.NextHeard(); }
+  std::optional<std::vector<uint8_t>> NextHave() { return nats_.NextHeard(HaveSubject()); }
   void PublishOptions(const std::string& process, Bytes data);
   void ListenToOptions();
-  std::optional<std::vector<uint8_t>> NextOptions() { return nats_.NextHeard(); }
+  std::optional<std::vector<uint8_t>> NextOptions() { return nats_.NextHeard(OptionsSubject("*")); }
 
  private:
   std::string Stream(const std::string& kind) const;
@@ -125,6 +130,7 @@ class SiteStreams : public LeaseRecords {
   std::string Subject(const std::string& kind, const KeyframeId& id) const;
   std::string HaveSubject() const;
   std::string LeaseSubject() const;
+  std::string StoredSubject(Kind kind) const;
   std::string OptionsSubject(const std::string& process) const;
 
   const std::string site_;

@@ -21,6 +21,8 @@ constexpr int64_t kWait_us = 50'000;
 constexpr int64_t kMaxWait_us = 15'000'000;
 constexpr char kHandler[] = "agent_handler";
 
+using Kind = SiteStreams::Kind;
+
 // The process that verifies candidates of this kind and must know their results.
 std::string VerifierOf(PlaceKind kind) {
   return kind == PlaceKind::kIntra ? "inter_map_ba" : "fusion";
@@ -37,6 +39,9 @@ WorkerBridge::WorkerBridge(Bus& bus, SiteStreams& streams, size_t max_matches)
       keyframes_(streams.Keyframes()),
       results_(streams.Results()) {
   streams_.ListenToHave();
+  for (const Kind kind : {Kind::kKeyframe, Kind::kMatch, Kind::kResult}) {
+    streams_.ListenToStored(kind);
+  }
   // The verifiers' options go to the site's journal, so that a replay verifies with the same ones.
   node_.Subscribe<options_t>(std::string(channels::kAllOptions),
                              [this](const std::string&, const options_t& options) {
@@ -131,12 +136,22 @@ void WorkerBridge::AnswerRequests() {
   }
 }
 
-void WorkerBridge::PassKeyframes() {
-  for (int i = 0; i < kKeyframes; ++i) {
+void WorkerBridge::ListenToStored(int64_t now_utime) {
+  for (const auto& [kind, watch] : {std::pair{Kind::kKeyframe, &keyframes_watch_},
+                                    {Kind::kMatch, &matches_watch_},
+                                    {Kind::kResult, &results_watch_}}) {
+    if (streams_.HeardOfStored(kind)) {
+      watch->NoteStored(now_utime);
+    }
+  }
+}
+
+void WorkerBridge::PassKeyframes(int64_t now_utime) {
+  for (int i = 0; i < kKeyframes && keyframes_watch_.IsDue(now_utime); ++i) {
     const auto message = keyframes_.Next();
     if (!message) {
       has_keyframes_ = has_keyframes_ || streams_.connected();
-      return;
+      return keyframes_watch_.NoteEmpty(now_utime);
     }
     KeyframeMessage keyframe{};
     if (DecodeMessage(message->data, &keyframe)) {
@@ -158,11 +173,11 @@ void WorkerBridge::PassHave() {
   }
 }
 
-void WorkerBridge::PassResults() {
+void WorkerBridge::PassResults(int64_t now_utime) {
   for (int i = 0; i < kResults; ++i) {
     const auto message = results_.Next();
     if (!message) {
-      return;
+      return results_watch_.NoteEmpty(now_utime);
     }
     constraint_t data{};
     if (!DecodeMessage(message->data, &data)) {
@@ -184,15 +199,16 @@ bool WorkerBridge::KnowsWhatItRestsOn(const PlaceMatch& match, int64_t now_utime
   }
   // A node of NATS that lags behind may not have all results, so their end is compared.
   const auto end = streams_.ResultsEnd();
-  PassResults();
+  PassResults(now_utime);
   return end && results_.HasHad(*end);
 }
 
 void WorkerBridge::TakeMatches(int64_t now_utime) {
-  while (outstanding_.size() < max_matches_) {
+  const bool waits = now_utime < given_back_utime_ + 4 * kWait_us;
+  while (outstanding_.size() < max_matches_ && (waits || matches_watch_.IsDue(now_utime))) {
     const auto delivery = streams_.FetchMatch();
     if (!delivery) {
-      return;
+      return matches_watch_.NoteEmpty(now_utime);
     }
     auto match = ParseMessage<place_match_t>(delivery->data);
     if (!match.value) {
@@ -202,6 +218,7 @@ void WorkerBridge::TakeMatches(int64_t now_utime) {
                KnowsWhatItRestsOn(*match.value, now_utime)) {
       TakeMatch(*std::move(match.value), delivery->ack_subject, now_utime);
     } else {
+      given_back_utime_ = now_utime;
       return streams_.Nak(delivery->ack_subject, kWait_us);
     }
   }
@@ -243,9 +260,12 @@ void WorkerBridge::BetweenMessages(int64_t now_utime) {
     return;
   }
   next_round_utime_ = now_utime + kRoundInterval_us;
-  PassKeyframes();
+  ListenToStored(now_utime);
+  PassKeyframes(now_utime);
   PassHave();
-  PassResults();
+  if (results_watch_.IsDue(now_utime)) {
+    PassResults(now_utime);
+  }
   StoreResults();
   std::erase_if(
       done_, [this](const std::string& ack_subject) { return streams_.Acknowledge(ack_subject); });

@@ -15,6 +15,7 @@
 // because verifiers ask for those of all maps, and most of them belong to other workers. If a
 // worker dies, its matches go to others. Not thread safe.
 
+#include <algorithm>
 #include <cstdint>
 #include <deque>
 #include <map>
@@ -27,6 +28,7 @@
 #include "cluster/outstanding_matches.h"
 #include "cluster/pending_matches.h"
 #include "cluster/site_streams.h"
+#include "cluster/stream_watch.h"
 #include "messages/catch_up_messages.h"
 #include "pangea/again_t.hpp"
 
@@ -41,7 +43,10 @@ class WorkerBridge : public Process {
 
   void Tick(int64_t now_utime) override;
   void BetweenMessages(int64_t now_utime) override;
-  int longest_wait_ms() const override { return 20; }
+  int longest_wait_ms() const override {
+    return std::min(keyframes_watch_.longest_wait_ms(next_round_utime_),
+                    results_watch_.longest_wait_ms(next_round_utime_));
+  }
 
  private:
   // Bounds for one round (one per kRoundInterval_us), so that the messages fit receive buffers.
@@ -59,9 +64,10 @@ class WorkerBridge : public Process {
   void OnResult(const Constraint& result);
   void OnRetransmission(const again_t& again);
   void OnResendRequest(const ResendRequest& request);
-  void PassKeyframes();
+  void ListenToStored(int64_t now_utime);
+  void PassKeyframes(int64_t now_utime);
   void PassHave();
-  void PassResults();
+  void PassResults(int64_t now_utime);
   void StoreResults();
   bool KnowsWhatItRestsOn(const PlaceMatch& match, int64_t now_utime);
   void TakeMatches(int64_t now_utime);
@@ -82,6 +88,8 @@ class WorkerBridge : public Process {
   PendingMatches pending_;
   SiteStreams::Reader keyframes_;
   SiteStreams::Reader results_;
+  StreamWatch keyframes_watch_, results_watch_, matches_watch_;
+  int64_t given_back_utime_ = 0;                    // when a match was last given back to wait
   std::map<int64_t, SiteStreams::Entry> to_store_;  // results by constraint id
   std::vector<std::string> done_;                   // ack subjects still to be acknowledged
   std::deque<Request> requests_;
