@@ -138,10 +138,17 @@ void UdpmReceiver::ClearFd() const {
   eventfd_read(waits_fd_, &ignored);
 }
 
+// The reader thread wrote it after the message was delivered.
+void UdpmReceiver::ClearStaleFd() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (queue_.empty()) {
+    ClearFd();
+  }
+}
+
 bool UdpmReceiver::DeliverOne() {
   std::unique_lock<std::mutex> lock(mutex_);
   if (queue_.empty()) {
-    ClearFd();  // the reader thread wrote it after the message was delivered
     return false;
   }
   const Message message = std::move(queue_.front());
@@ -169,7 +176,8 @@ bool UdpmReceiver::Handle(int timeout_ms) {
   while (poll(&waits, 1, timeout_ms) > 0) {
     if (DeliverOne()) {
       return true;
-    }  // else it was written for a message that is delivered already
+    }
+    ClearStaleFd();
   }
   return false;
 }

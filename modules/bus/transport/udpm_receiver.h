@@ -62,6 +62,7 @@ class UdpmReceiver {
   std::vector<size_t> WithRoom(const std::vector<size_t>& subscriptions);
   bool Enqueue(const UdpmAssembler::Message& message);
   void ClearFd() const;
+  void ClearStaleFd();
   bool DeliverOne();
   int64_t DroppedByKernel() const;
 
