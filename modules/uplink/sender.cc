@@ -232,6 +232,7 @@ bool Sender::AddUnderWay(const KeyframeId& next, std::vector<KeyframeId>* ids,
 std::vector<Sender::Sent> Sender::Poll(int64_t now_us) {
   std::vector<Sent> sent;
   pacer_.Refill(now_us);
+  paced_ = false;
   FindLost(highest_acked_, now_us);
   for (const KeyframeId& id : UnderWay()) {
     const auto it = spool_.find(id);
@@ -261,7 +262,8 @@ void Sender::SendPieces(const KeyframeId& id, Item* item, int64_t now_us, std::v
     }
     const Bytes data = pangea::Piece(item->bytes, options_.payload_bytes, i);
     const auto size = static_cast<int>(data.size());
-    if (!pacer_.Ready() || in_flight_bytes_ + size > options_.max_in_flight_bytes) {
+    paced_ = !pacer_.Ready();
+    if (paced_ || in_flight_bytes_ + size > options_.max_in_flight_bytes) {
       return;
     }
     const int copies = Copies(piece);

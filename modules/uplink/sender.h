@@ -79,8 +79,11 @@ class Sender {
     KeyframeId keyframe;
     LinkPiece piece;  // valid until the next call; the caller must set its slot
   };
-  // The pieces to send now. Call it every few milliseconds while keyframes are spooled.
+  // The pieces to send now. Call it after each acknowledgement, every few milliseconds while
+  // Paced(), and often enough for the time-outs while keyframes are spooled.
   std::vector<Sent> Poll(int64_t now_us);
+  // Whether the last Poll left pieces because of the bandwidth.
+  bool Paced() const { return paced_; }
   // The number for a packet of another kind, which the sender neither keeps nor repeats. Its
   // acknowledgement also measures the round trip, so the time-out is right from the first keyframe.
   int64_t NextNumber(int64_t now_us);
@@ -127,6 +130,7 @@ class Sender {
   const SenderOptions options_;
   const Load load_;
   Pacer pacer_;
+  bool paced_ = false;
   std::map<KeyframeId, Item> spool_;
   std::map<MapId, int> spooled_of_;  // number of spooled keyframes of each map that has any
   std::set<KeyframeId> started_;     // those with pieces

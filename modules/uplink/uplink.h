@@ -89,7 +89,6 @@ class Uplink {
   std::map<MapId, int32_t> Acknowledged() const;
 
   bool Connected(int64_t now_us) const;
-  bool Idle() const { return sender_.spooled() == 0; }
   const Sender& sender() const { return sender_; }
   int64_t keyframes_acked() const { return keyframes_acked_; }
   int64_t keyframes_lost() const { return keyframes_lost_; }

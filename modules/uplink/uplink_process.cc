@@ -21,8 +21,10 @@ namespace {
 
 constexpr int64_t kHaveInterval_us = 400'000;
 constexpr int kStoredAtOnce = 50;  // keyframes that the disk refused before
+// Waits for the next Poll. A message ends them, so between keyframes only the hellos matter.
 constexpr int kBusy_ms = 4;
-constexpr int kIdle_ms = 20;
+constexpr int kTimeouts_ms = 20;
+constexpr int kIdle_ms = 100;
 
 size_t Checksum(Bytes data) {
   return std::hash<std::string_view>{}({reinterpret_cast<const char*>(data.data()), data.size()});
@@ -275,7 +277,10 @@ int UplinkProcess::Poll(int64_t steady_us) {
   PublishAsks();
   PublishCorrections();
   anchors_.Publish(steady_us);
-  return uplink_.Idle() && !anchors_.moving() ? kIdle_ms : kBusy_ms;
+  if (uplink_.sender().Paced() || anchors_.moving()) {
+    return kBusy_ms;
+  }
+  return num_waiting() > 0 || anchors_.edits_waiting() > 0 ? kTimeouts_ms : kIdle_ms;
 }
 
 void UplinkProcess::PublishHave() {

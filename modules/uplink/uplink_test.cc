@@ -63,6 +63,21 @@ TEST_F(UplinkTest, KeepsTryingWithHellosOnlyWhileTheHandlerIsAway) {
   EXPECT_THAT(SentSeqs(uplink.Poll(10 * kSecond)), testing::ElementsAre(0));
 }
 
+// The process polls 250 times a second while it is paced, which a phone's battery pays.
+TEST_F(UplinkTest, IsPacedOnlyUntilAllPiecesAreSent) {
+  Uplink slow({.sender = {.bandwidth_kb_per_s = 10}});
+  slow.AddKeyframe({kMap, 0}, std::vector<uint8_t>(30'000), 0);
+  slow.Poll(0);
+  EXPECT_FALSE(slow.sender().Paced()) << "the handler is away";
+  slow.OnAck(Ack(1, -1), kSecond);
+  slow.Poll(kSecond);
+  EXPECT_TRUE(slow.sender().Paced());
+  slow.OnAck(Ack(2, -1), 2 * kSecond);
+  slow.Poll(2 * kSecond);
+  EXPECT_FALSE(slow.sender().Paced()) << "it waits for the acknowledgement";
+  EXPECT_EQ(slow.sender().spooled(), 1u);
+}
+
 TEST_F(UplinkTest, WhatTheJournalHasIsReleased) {
   for (int seq = 0; seq < 5; ++seq) {
     Add(seq);
@@ -149,7 +164,7 @@ TEST_F(UplinkTest, AHandlerWithLessIsServedAnew) {
     Add(seq);
   }
   uplink.OnAck(Ack(1, 2), kSecond);
-  EXPECT_TRUE(uplink.Idle());
+  EXPECT_EQ(uplink.sender().spooled(), 0u);
   uplink.OnNewSession();
   uplink.OnAck(Ack(1, -1), 2 * kSecond);
   const auto asks = uplink.Asks(3 * kSecond);
@@ -334,7 +349,7 @@ TEST(UplinkSpool, HundredsOfUnsentMapsAreAnnouncedAFewAtATime) {
   }
   std::array<MapId, 256> of_slot;  // as the handler understands it
   std::set<MapId> sent;
-  for (int round = 1; round < kMaps && !uplink.Idle(); ++round) {
+  for (int round = 1; round < kMaps && uplink.sender().spooled() > 0; ++round) {
     LinkAck ack = Ack(round, -1);
     ack.journalled_seq.clear();
     for (const LinkPacket& packet : uplink.Poll(round * kSecond)) {
@@ -351,7 +366,7 @@ TEST(UplinkSpool, HundredsOfUnsentMapsAreAnnouncedAFewAtATime) {
     }
     uplink.OnAck(ack, round * kSecond);
   }
-  EXPECT_TRUE(uplink.Idle());
+  EXPECT_EQ(uplink.sender().spooled(), 0u);
   EXPECT_EQ(sent.size(), size_t{kMaps});
 }
 
