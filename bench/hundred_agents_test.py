@@ -50,6 +50,7 @@ class HundredAgentsTest(unittest.TestCase):
         site = Namespace(name="site_1", folder=self.work / "site_1", agents=range(6, 9))
         site.folder.mkdir()
         self.run_ = Namespace(work=self.work, sites=[site], took_s=9, memory_kb={"pangea-fusion": {"7": 2000, "8": 4000}},
+                              cpu_s={"pangea-fusion": {"7": 1.5, "8": 2.5}},
                               options=Namespace(agents=3, rate=0.5), expected_groups=lambda: [[1, 2], [3]])
         self.keyframes = {agent: [keyframe(agent, seq, 1_000_000 * (seq + 1)) for seq in range(3)] for agent in site.agents}
         self.corrections = {6: [correction(6, 0, 1_500_000), correction(6, 1, 2_300_000)],
@@ -80,7 +81,7 @@ class HundredAgentsTest(unittest.TestCase):
         # Keyframe 0 of agent 7 was sent before its map was fused; keyframe 1 of agent 8 is in another group than agent 7.
         self.assertEqual((found["first"]["count"], found["first"]["median_ms"]), (1, 1500))
         self.assertEqual((found["corrected"]["count"], found["corrected"]["median_ms"]), (2, 200))
-        self.assertIn("| pangea-fusion | 2 | 4.0 | 4.0 |", table(found))
+        self.assertIn("| pangea-fusion | 2 | 4.0 | 4.0 | 4.0 |", table(found))
 
     def test_a_keyframe_in_no_journal(self):
         self.lost = 1

@@ -72,6 +72,7 @@ def metrics(run, types):
         "first": spread([s for site in sites for s in site["first_s"]]),
         "corrected": spread([s for site in sites for s in site["corrected_s"]]),
         "memory_mb": {name: of_processes(kb.values()) for name, kb in sorted(run.memory_kb.items())},
+        "cpu_s": {name: round(sum(seconds.values()), 1) for name, seconds in sorted(run.cpu_s.items())},
     }
 
 
@@ -92,6 +93,7 @@ def table(found):
     lines = [text.format(**found), "",
              "| keyframes with a constraint, from sent to corrected | number | median ms | p99 ms | largest ms |",
              "|---|---|---|---|---|", row("before the agent's map is fused", found["first"]), row("after", found["corrected"]), "",
-             "| process | number | resident MB, median | largest |", "|---|---|---|---|",
-             *("| {} | {number} | {median} | {largest} |".format(name, **mb) for name, mb in found["memory_mb"].items())]
+             "| process | number | resident MB, median | largest | CPU s of all |", "|---|---|---|---|---|",
+             *("| {} | {number} | {median} | {largest} | {} |".format(name, found["cpu_s"][name], **mb)
+               for name, mb in found["memory_mb"].items())]
     return "\n".join(lines) + "\n"

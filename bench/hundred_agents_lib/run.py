@@ -19,6 +19,17 @@ cluster = module_from_spec(spec_from_loader("cluster_script", loader))
 loader.exec_module(cluster)
 
 
+def cpu_seconds(process):
+    user, system = (process / "stat").read_text().rsplit(")", 1)[1].split()[11:13]
+    return (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
+
+
+def role_of(process):
+    """A bridge's role, with a blank before it; empty for others."""
+    words = (process / "cmdline").read_text().split("\0")
+    return f" {words[words.index('--role') + 1]}" if "--role" in words else ""
+
+
 class Site:
     def __init__(self, run, number):
         self.name = f"site_{number + 1}"
@@ -45,7 +56,8 @@ class Run:
         self.options = options
         self.work = options.work.resolve()
         self.bin = options.build.resolve() / "bin"
-        self.memory_kb = {}  # process name: resident memory of each running process
+        self.memory_kb = {}  # process name: largest resident memory of each process, by its id
+        self.cpu_s = {}  # the same for its CPU time
         self.took_s = 0
         cluster.BIN = self.bin
 
@@ -98,18 +110,20 @@ class Run:
         processes.start(f"player_{agent}", self.bin / "pangea-keyframe-player", "--agent", agent, "--bus", site.agent_bus(agent),
                         "--keyframes", self.work / f"logs/walk_{agent}.lcm", "--rate", self.options.rate)
 
-    def sample_memory(self):
-        """The largest memory of each process so far, by the program's name."""
+    def sample_processes(self):
+        """The largest memory and CPU time of each process so far, by the program's name."""
         for entry in Path("/proc").iterdir():
             if entry.name.isdigit():
                 try:
                     program = Path(os.readlink(entry / "exe"))
-                    kb = resident_kb(int(entry.name))
+                    kb, cpu_s = resident_kb(int(entry.name)), cpu_seconds(entry)
+                    name = program.name + role_of(entry)
                 except OSError:  # the process has ended
                     continue
                 if program.parent == self.bin or program.name == "nats-server":
-                    of_program = self.memory_kb.setdefault(program.name, {})
-                    of_program[entry.name] = max(kb, of_program.get(entry.name, 0))
+                    for largest, now in (self.memory_kb, kb), (self.cpu_s, cpu_s):
+                        of_program = largest.setdefault(name, {})
+                        of_program[entry.name] = max(now, of_program.get(entry.name, 0))
 
     def maps_bytes(self):
         return sum((self.work / f"logs/{site.name}.lcm").stat().st_size for site in self.sites)
@@ -120,7 +134,7 @@ class Run:
         size = -1
         while time.monotonic() - quiet_since < self.options.quiet:
             time.sleep(STEP_S)
-            self.sample_memory()
+            self.sample_processes()
             playing = sum(name.startswith("player_") and process.poll() is None for name, process in processes.running.items())
             if playing or self.maps_bytes() != size:
                 quiet_since, size = time.monotonic(), self.maps_bytes()
