@@ -5,7 +5,7 @@ import { Zip, ZipPassThrough } from "fflate";
 import type { ImuSample } from "./euroc";
 
 const kPartBytes = 4_000_000;
-const kRowsAtOnce = 1000; // a few milliseconds
+const kRowsAtOnce = 2000; // a few milliseconds
 // Below the bounds of a zip: 65,535 files and 4 GiB.
 const kMaxImages = 65_000; // 36 minutes at 30 Hz
 const kMaxBytes = 4_000_000_000;
