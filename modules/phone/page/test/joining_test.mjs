@@ -156,6 +156,10 @@ async function testLeaving(browser, url) {
   await page.evaluate((key) => localStorage.setItem("pangea.membership", JSON.stringify({ agent: 2, key, site: "hall", name: "Anna" })), "ab".repeat(32));
   await leaveUnsent(page, "pangea.spool.2");
   await page.reload();
+  const tab = await page.context().newPage();
+  await tab.goto(url);
+  check("a second tab knows the member", (await tab.locator("#invitation").textContent()).startsWith("You are Anna"));
+  await page.bringToFront();
   const isMember = () => page.evaluate(() => localStorage.getItem("pangea.membership") !== null);
   await page.locator("#forget").click();
   await becomes(page, "whoever leaves reads what is lost", () =>
@@ -167,6 +171,7 @@ async function testLeaving(browser, url) {
   await page.locator("#leave_dialog [value=leave]").click();
   await becomes(page, "or leave", () => document.getElementById("code").checkVisibility());
   check("without the key", !(await isMember()));
+  await becomes(tab, "and the second tab has it no longer", () => document.getElementById("code").checkVisibility());
   await page.close();
 }
 

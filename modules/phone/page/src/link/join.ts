@@ -21,6 +21,11 @@ export function parseMembership(json: string | undefined): Membership | undefine
   }
 }
 
+// Calls `onChange` when another tab has joined or left.
+export function watchMembership(onChange: () => void) {
+  addEventListener("storage", ({ key }) => key === kStorageKey && onChange());
+}
+
 export const storedMembership = () => parseMembership(stored(kStorageKey));
 export const forgetMembership = () => forget(kStorageKey);
 // False if the browser does not keep it.

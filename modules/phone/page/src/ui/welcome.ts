@@ -2,7 +2,7 @@
 
 import { SpoolStore, spoolOf } from "../agent/spool_store";
 import { askDialog, byId } from "../dom";
-import { CodeRefused, codeIn, forgetMembership, join, keepMembership, storedMembership } from "../link/join";
+import { CodeRefused, codeIn, forgetMembership, join, keepMembership, storedMembership, watchMembership } from "../link/join";
 import type { Membership } from "../messages";
 import { forgetCalibrations, storedCalibrations } from "../sensors/calibration";
 import { notice } from "./notice";
@@ -34,6 +34,10 @@ export class Welcome {
       forgetCalibrations();
       this.show();
     };
+    watchMembership(() => {
+      this.membership = storedMembership();
+      if (!byId("welcome").hidden) this.show();
+    });
     this.show();
   }
 
