@@ -20,16 +20,14 @@ struct NearestCorner {
 };
 
 // Searches `corners[i]` for each i in `candidates`. An i with distance_of(i) == kNoDistance is
-// ignored. "Elsewhere" means more than `other_corner_px` pixels from the nearest corner.
+// ignored. "Elsewhere" means more than `other_corner_px` pixels from the nearest corner. Distances
+// are computed a second time only if a corner is near enough, which costs less than to store them.
 template <typename Candidates, typename DistanceOf>
 NearestCorner FindNearest(const std::vector<Corner>& corners, const Candidates& candidates,
                           const DistanceOf& distance_of, int max_distance, double other_corner_px) {
   NearestCorner nearest;
-  std::vector<int> distances(std::size(candidates));
-  size_t k = 0;
   for (const int i : candidates) {
     const int distance = distance_of(i);
-    distances[k++] = distance;
     if (distance < nearest.distance) {
       nearest.distance = distance;
       nearest.index = i;
@@ -38,9 +36,8 @@ NearestCorner FindNearest(const std::vector<Corner>& corners, const Candidates& 
   if (nearest.distance > max_distance) {
     return {};
   }
-  k = 0;
   for (const int i : candidates) {
-    const int distance = distances[k++];
+    const int distance = distance_of(i);
     if (distance < nearest.second && (corners[i].pixel - corners[nearest.index].pixel).norm() >
                                          static_cast<float>(other_corner_px)) {
       nearest.second = distance;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -78,7 +79,7 @@ class Triangulation {
     }
   }
 
-  std::vector<Sight> Sights(int corner) const {
+  std::vector<Sight> Sights(int corner) {
     std::vector<Sight> sights;
     const double sigma = RaySigma(host_, corner);
     for (const Neighbour& neighbour : neighbours_) {
@@ -157,10 +158,10 @@ class Triangulation {
     }
   }
 
-  // Positions in the neighbour's lists, ascending, of corners near the epipolar line. Most are
-  // rejected by a single-precision distance.
-  static std::vector<int> NearLine(const Eigen::Vector3d& line, double host_sigma,
-                                   const Neighbour& neighbour) {
+  // The neighbour's corners near the epipolar line, ascending; valid until the next call. Most are
+  // rejected by a single-precision distance, without branches.
+  std::span<const int> NearLine(const Eigen::Vector3d& line, double host_sigma,
+                                const Neighbour& neighbour) {
     constexpr double kSlack = 1.01, kSinglePrecision = 1e-5;
     const double norm = line.head<2>().norm();
     const auto reach = static_cast<float>(
@@ -169,33 +170,36 @@ class Triangulation {
         kSinglePrecision * line.norm());
     const Eigen::Vector3f a = line.cast<float>();
     const size_t n = neighbour.corners.size();
-    std::vector<float> distances(n);
+    distances_.resize(std::max(n, distances_.size()));
+    near_.resize(distances_.size());
     for (size_t k = 0; k < n; ++k) {
-      distances[k] = std::abs(a.x() * neighbour.x[k] + a.y() * neighbour.y[k] + a.z());
+      distances_[k] = std::abs(a.x() * neighbour.x[k] + a.y() * neighbour.y[k] + a.z());
     }
-    std::vector<int> near;
+    size_t num_near = 0;
     for (size_t k = 0; k < n; ++k) {
-      if (distances[k] > reach) {
-        continue;
-      }
+      near_[num_near] = static_cast<int>(k);
+      num_near += distances_[k] <= reach ? 1 : 0;
+    }
+    size_t num_nearer = 0;
+    for (size_t i = 0; i < num_near; ++i) {
+      const int k = near_[i];
       const double distance = std::abs(line.dot(Ray(*neighbour.view, neighbour.corners[k]))) / norm;
       if (distance <
           kMaxLineSigmas * std::hypot(host_sigma, neighbour.sigmas[k], neighbour.sigma_rad)) {
-        near.push_back(static_cast<int>(k));
+        near_[num_nearer++] = neighbour.corners[k];
       }
     }
-    return near;
+    return {near_.data(), num_nearer};
   }
 
   // The corner near the epipolar line with the nearest descriptor, if it passes the ratio test.
-  std::optional<Sight> Find(int host_corner, double host_sigma, const Neighbour& neighbour) const {
+  std::optional<Sight> Find(int host_corner, double host_sigma, const Neighbour& neighbour) {
     const Eigen::Vector3d line =
         neighbour.T_cam_host.t.cross(neighbour.T_cam_host.q * Ray(host_, host_corner));
-    std::vector<int> near = NearLine(line, host_sigma, neighbour);
+    const std::span<const int> near = NearLine(line, host_sigma, neighbour);
     if (near.empty()) {
       return std::nullopt;
     }
-    std::ranges::transform(near, near.begin(), [&](int k) { return neighbour.corners[k]; });
     const std::vector<Corner>& corners = neighbour.view->keyframe().corners;
     const Descriptor& descriptor = host_.keyframe().corners[host_corner].descriptor;
     const NearestCorner nearest = FindNearest(
@@ -237,6 +241,9 @@ class Triangulation {
 
   const KeyframeView& host_;
   std::vector<Neighbour> neighbours_;
+  // Of NearLine, allocated once.
+  std::vector<float> distances_;
+  std::vector<int> near_;
 };
 
 void AddLandmark(int host_corner, const InverseDepth& depth, const std::vector<Sight>& sights,
@@ -265,7 +272,7 @@ void TriangulateMatchedCorners(const TriangulationOptions& options, const Keyfra
   if (static_cast<int>(window->landmarks.size()) > options.few_landmarks) {
     return;
   }
-  const Triangulation triangulation(*window, after);
+  Triangulation triangulation(*window, after);
   const size_t most = window->landmarks.size() + kMaxAdded;
   const int host = window->newest();
   const int num_corners = static_cast<int>(window->newest_keyframe().corners.size());
