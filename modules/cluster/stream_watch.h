@@ -1,8 +1,8 @@
 #pragma once
 
 // When a reader of a stream asks NATS for its next message: after a client said that it stored
-// something, and once in kLook_us, because what clients say may be lost. Each question costs NATS
-// and the reader a tenth of a millisecond.
+// something, and once in kLook_us, because what clients say may be lost. Asking 50 times a second
+// took half of an idle site's CPU.
 
 #include <algorithm>
 #include <cstdint>

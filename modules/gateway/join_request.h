@@ -18,8 +18,8 @@ std::string PlainJoinCode(std::string_view text);
 
 struct JoinRequest {
   std::string code;  // as PlainJoinCode returns it
-  std::string
-      name;  // UTF-8 without control characters, at most kMaxVisitorName bytes; may be empty
+  // UTF-8 without control characters, at most kMaxVisitorName bytes; may be empty.
+  std::string name;
 };
 
 inline constexpr size_t kMaxVisitorName = 120;  // 40 characters, also Chinese ones
