@@ -6,7 +6,7 @@
 #include <string>
 
 #include "bus/bus.h"
-#include "cluster/nats_access.h"
+#include "cluster/nats/nats_access.h"
 
 namespace pangea {
 

@@ -15,7 +15,7 @@
 #include <optional>
 #include <string>
 
-#include "cluster/nats_client.h"
+#include "cluster/nats/nats_client.h"
 
 namespace pangea {
 

@@ -22,7 +22,7 @@
 #include <utility>
 #include <vector>
 
-#include "cluster/nats_client.h"
+#include "cluster/nats/nats_client.h"
 #include "cluster/site_lease.h"
 #include "core/keyframe.h"
 #include "core/server_messages.h"

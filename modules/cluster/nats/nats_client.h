@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "cluster/nats_access.h"
+#include "cluster/nats/nats_access.h"
 #include "core/bytes.h"
 
 namespace pangea {

@@ -1,4 +1,4 @@
-#include "cluster/nats_access.h"
+#include "cluster/nats/nats_access.h"
 
 #include <fmt/format.h>
 

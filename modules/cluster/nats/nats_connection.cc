@@ -1,4 +1,4 @@
-#include "cluster/nats_connection.h"
+#include "cluster/nats/nats_connection.h"
 
 #include <fmt/format.h>
 

@@ -8,7 +8,7 @@
 #include <memory>
 #include <string>
 
-#include "cluster/nats_access.h"
+#include "cluster/nats/nats_access.h"
 
 namespace pangea {
 

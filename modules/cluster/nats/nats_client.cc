@@ -1,4 +1,4 @@
-#include "cluster/nats_client.h"
+#include "cluster/nats/nats_client.h"
 
 #include <fmt/format.h>
 #include <nats/nats.h>
@@ -11,7 +11,7 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "cluster/nats_connection.h"
+#include "cluster/nats/nats_connection.h"
 
 namespace pangea {
 namespace {
