@@ -9,6 +9,8 @@
 #include <optional>
 
 #include "files/text_file.h"
+#include "g2o/g2o.h"
+#include "g2o/graph_solver.h"
 #include "log_tools/anchors_gltf.h"
 #include "log_tools/explain.h"
 #include "log_tools/log_anchors.h"
@@ -260,23 +262,49 @@ void AddExplain(CLI::App& app, Arguments* arguments) {
   explain->callback([arguments] { ExplainResult(*arguments); });
 }
 
+Graph ReadGraph(const std::string& path) {
+  Graph graph = ReadG2o(path);
+  if (graph.vertices.empty()) {
+    throw std::runtime_error(
+        fmt::format("{}: has no VERTEX_SE3:QUAT: no pose graph in g2o format", path));
+  }
+  return graph;
+}
+
 void AddCost(CLI::App& app, Arguments* arguments) {
   CLI::App* cost = app.add_subcommand("cost", "The cost of a pose graph in g2o format");
   cost->add_option("graph", arguments->g2o, "g2o file")->required()->check(CLI::ExistingFile);
   cost->callback([arguments] {
-    const Graph graph = ReadG2o(arguments->g2o);
-    if (graph.vertices.empty()) {
-      throw std::runtime_error(
-          fmt::format("{}: has no VERTEX_SE3:QUAT: no pose graph in g2o format", arguments->g2o));
-    }
+    const Graph graph = ReadGraph(arguments->g2o);
     std::cout << fmt::format("{}: {} vertices, {} edges, cost {:.3f}\n", arguments->g2o,
                              graph.vertices.size(), graph.edges.size(), Cost(graph));
   });
 }
 
+void AddSolve(CLI::App& app, Arguments* arguments) {
+  CLI::App* solve = app.add_subcommand(
+      "solve",
+      "Moves the vertices of a pose graph in g2o format to the lowest cost, in all six degrees of "
+      "freedom. Vertices with FIX stay, else the first of each connected part");
+  solve->add_option("graph", arguments->g2o, "g2o file")->required()->check(CLI::ExistingFile);
+  solve->add_option("--out", arguments->out, "The solved graph, g2o format")->required();
+  solve->callback([arguments] {
+    CheckIsNotTheLog(arguments->out, arguments->g2o);
+    Graph graph = ReadGraph(arguments->g2o);
+    const GraphSolution solution = SolveGraph(&graph);
+    WriteTextFile(arguments->out, ToG2o(graph));
+    std::cout << fmt::format(
+        "{}: {} vertices, {} edges, cost {:.3f} -> {:.3f} after {} iterations{}{}\n",
+        arguments->out, graph.vertices.size(), graph.edges.size(), solution.cost_at_start,
+        solution.cost, solution.iterations, solution.averaged ? ", from averaged rotations" : "",
+        solution.converged ? "" : "; NOT CONVERGED");
+    arguments->exit_code = solution.converged ? 0 : 1;
+  });
+}
+
 void AddCommands(CLI::App& app, Arguments* arguments) {
   for (const auto add : {AddInfo, AddList, AddAnchors, AddDiff, AddCut, AddCat, AddExport,
-                         AddImport, AddExplain, AddCost}) {
+                         AddImport, AddExplain, AddCost, AddSolve}) {
     add(app, arguments);
   }
 }

@@ -200,5 +200,15 @@ TEST_F(BadG2oTest, AnInformationMatrixIsPositiveDefinite) {
               testing::StartsWith("bad.g2o:3: information 6,6 1e300 is not from"));
 }
 
+// GTSAM numbers vertices by a letter in the highest byte.
+TEST_F(BadG2oTest, VerticesMayHaveNumbersOf63Bits) {
+  const std::string a = "6989586621679009792", b = "7061644215716937728";
+  const std::string text = "VERTEX_SE3:QUAT " + a + " 0 0 0 0 0 0 1\nVERTEX_SE3:QUAT " + b +
+                           " 1 0 0 0 0 0 1\n" + Edge(a + " " + b, "1");
+  EXPECT_EQ(ErrorOf(text).substr(0, 5), "cost ");
+  EXPECT_EQ(ErrorOf("VERTEX_SE3:QUAT 9989586621679009792 0 0 0 0 0 0 1\n"),
+            "bad.g2o:1: the id '9989586621679009792' is no vertex' number");
+}
+
 }  // namespace
 }  // namespace pangea

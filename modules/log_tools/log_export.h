@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "core/ids.h"
+#include "g2o/g2o.h"
 #include "log_file/log_reading.h"
-#include "log_tools/g2o.h"
 
 namespace pangea {
 

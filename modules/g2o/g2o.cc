@@ -1,4 +1,4 @@
-#include "log_tools/g2o.h"
+#include "g2o/g2o.h"
 
 #include <fmt/format.h>
 
@@ -9,7 +9,6 @@
 #include <cmath>
 #include <cstdint>
 #include <fstream>
-#include <limits>
 #include <sstream>
 #include <stdexcept>
 #include <utility>
@@ -76,13 +75,13 @@ class Line {
     return word;
   }
   bool AtEnd() { return (stream_ >> std::ws).eof(); }
-  int Vertex(const std::string& field) {
+  int64_t Vertex(const std::string& field) {
     const std::string word = Word();
     int64_t id = 0;
-    if (!ParseNumber(word, &id) || id < 0 || id > std::numeric_limits<int>::max()) {
+    if (!ParseNumber(word, &id) || id < 0) {
       Fail(fmt::format("{} '{}' is no vertex' number", field, Shown(word)));
     }
-    return static_cast<int>(id);
+    return id;
   }
   double Number(const std::string& field, double most) {
     const std::string word = Word();
@@ -160,7 +159,7 @@ class Reader {
   // Checks the edges at the end: a file may have edges before their vertices.
   Graph Finish() {
     for (size_t i = 0; i < graph_.edges.size(); ++i) {
-      for (const int id : {graph_.edges[i].from, graph_.edges[i].to}) {
+      for (const int64_t id : {graph_.edges[i].from, graph_.edges[i].to}) {
         CheckVertex(id, edge_lines_[i], "an end of the edge");
       }
     }
@@ -172,7 +171,7 @@ class Reader {
 
  private:
   void TakeVertex(Line* line) {
-    const int id = line->Vertex("the id");
+    const int64_t id = line->Vertex("the id");
     if (const auto [first, is_new] = vertex_lines_.emplace(id, line->number()); !is_new) {
       line->Fail(fmt::format("vertex {} is there already, in line {}", id, first->second));
     }
@@ -223,7 +222,7 @@ class Reader {
     }
   }
 
-  void CheckVertex(int id, int line, const std::string& what) const {
+  void CheckVertex(int64_t id, int line, const std::string& what) const {
     if (!graph_.vertices.contains(id)) {
       Line::FailAt(path_, line, fmt::format("{}, {}, is no vertex of the file", what, id));
     }
@@ -232,35 +231,20 @@ class Reader {
   const std::string& path_;
   const double max_position_m_;
   Graph graph_;
-  std::map<int, int> vertex_lines_;  // by vertex
-  std::vector<int> fixed_lines_;     // parallel to graph_.fixed
-  std::vector<int> edge_lines_;      // parallel to graph_.edges
-  std::map<std::pair<int, int>, std::vector<size_t>> edges_between_;
+  std::map<int64_t, int> vertex_lines_;  // by vertex
+  std::vector<int> fixed_lines_;         // parallel to graph_.fixed
+  std::vector<int> edge_lines_;          // parallel to graph_.edges
+  std::map<std::pair<int64_t, int64_t>, std::vector<size_t>> edges_between_;
 };
 
 }  // namespace
-
-double Cost(const Graph& graph) {
-  double cost = 0;
-  for (const GraphEdge& edge : graph.edges) {
-    const Rigid3 T_from_to = graph.vertices.at(edge.from).Inverse() * graph.vertices.at(edge.to);
-    const Vector6d xi = T_from_to.Minus(edge.T_from_to);
-    const double share = xi.dot(edge.covariance.ldlt().solve(xi));
-    if (!std::isfinite(share) || share < 0) {
-      throw std::runtime_error(
-          fmt::format("the edge {} -> {} has the cost {}", edge.from, edge.to, share));
-    }
-    cost += share;
-  }
-  return cost;
-}
 
 std::string ToG2o(const Graph& graph) {
   std::string text;
   for (const auto& [id, pose] : graph.vertices) {
     text += fmt::format("VERTEX_SE3:QUAT {} {}\n", id, Pose(pose));
   }
-  for (const int id : graph.fixed) {
+  for (const int64_t id : graph.fixed) {
     text += fmt::format("FIX {}\n", id);
   }
   for (const GraphEdge& edge : graph.edges) {
