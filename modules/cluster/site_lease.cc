@@ -54,9 +54,10 @@ bool SiteLease::Renew(int64_t now_utime) {
   if (now_utime - renewed_utime_ < kRenew_us || Write(holder_, sequence_, now_utime)) {
     return true;
   }
-  // Either our record was written and NATS' answer was lost, or another host has the lease.
+  // Either our record was written and NATS' answer was lost, or another host has the lease. An
+  // older record is from a former leader of the stream, which does not know of ours.
   const auto newest = records_.LeaseSequence();
-  if (!newest || *newest == sequence_) {
+  if (!newest || *newest <= sequence_) {
     return true;
   }
   const auto holder = HolderAt(*newest);

@@ -24,6 +24,7 @@ class LeaseRecords {
  public:
   virtual ~LeaseRecords() = default;
   // The sequence of the newest record, as the stream's leader knows it; 0: there is no record.
+  // After a cut of the network, a former leader may answer.
   virtual std::optional<uint64_t> LeaseSequence() = 0;
   // The newest record, or an older one if a replica answers that lags.
   virtual std::optional<NatsClient::Message> FindLease() = 0;

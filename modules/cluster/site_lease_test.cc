@@ -1,4 +1,5 @@
-// The lease, when the replica of NATS that answers lags behind the stream's leader.
+// The lease, when the replica of NATS that answers lags behind the stream's leader, or was its
+// leader until the network was cut, and does not know that it is none any more.
 
 #include "cluster/site_lease.h"
 
@@ -12,10 +13,13 @@ namespace {
 
 constexpr int64_t kSecond = 1'000'000;  // microseconds
 
-// The leader has all records, the replica that is asked for a record only the first ones.
+// The leader has all records, the replica that is asked for a record only the first ones. A former
+// leader has only the first ones, and stores nothing.
 class LaggingRecords : public LeaseRecords {
  public:
-  std::optional<uint64_t> LeaseSequence() override { return records_.size(); }
+  std::optional<uint64_t> LeaseSequence() override {
+    return records_.size() - (former_leader ? lag : 0);
+  }
   std::optional<NatsClient::Message> FindLease() override {
     const size_t known = records_.size() - lag;
     if (known == 0) {
@@ -25,6 +29,9 @@ class LaggingRecords : public LeaseRecords {
     return NatsClient::Message{"", known, 0, {record.begin(), record.end()}};
   }
   NatsClient::StoreAnswer StoreLease(const std::string& record, uint64_t behind) override {
+    if (former_leader) {
+      return {NatsClient::Stored::kUnreachable};
+    }
     if (behind != records_.size()) {
       return {NatsClient::Stored::kOtherwise};
     }
@@ -33,6 +40,7 @@ class LaggingRecords : public LeaseRecords {
   }
 
   size_t lag = 0;  // records
+  bool former_leader = false;
 
  private:
   std::vector<std::string> records_;
@@ -70,6 +78,20 @@ TEST_F(SiteLeaseTest, AnOldRecordOfOursDoesNotHideTheNewHolder) {
   records.lag = 0;
   EXPECT_FALSE(first.Renew(now + kSecond));
   EXPECT_EQ(first.seen_holder(), "second");
+}
+
+// Seen after a cut of 30 s: both hosts gave the site up.
+TEST_F(SiteLeaseTest, AFormerLeadersRecordDoesNotTakeItFromItsHolder) {
+  ASSERT_TRUE(first.TryAcquire(kSecond));
+  ASSERT_FALSE(second.TryAcquire(kSecond));
+  const int64_t now = kSecond + SiteLease::kHeld_us;
+  ASSERT_TRUE(second.TryAcquire(now));
+  records.lag = 1;
+  records.former_leader = true;
+  EXPECT_TRUE(second.Renew(now + kSecond)) << "nobody has taken it";
+  records.former_leader = false;
+  EXPECT_TRUE(second.Renew(now + kSecond));
+  EXPECT_TRUE(second.fresh(now + kSecond));
 }
 
 }  // namespace
