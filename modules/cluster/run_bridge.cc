@@ -58,22 +58,36 @@ int RunStandby(const BridgeArguments& arguments, SiteStreams& streams) {
   return is_core ? 0 : 1;
 }
 
-int RunCore(const BridgeArguments& arguments, SiteStreams& streams, bool waits) {
-  streams.Make(arguments.replicas);
-  SiteLease lease(streams, arguments.holder);
-  const auto said = [&] { return fmt::format("{} has the site", lease.seen_holder()); };
-  if (!lease.TryAcquire(WallUtime()) && !waits) {
-    throw std::runtime_error(said());
-  }
-  if (lease.term() == 0 && !Wait([&] { return lease.TryAcquire(WallUtime()); }, said)) {
-    return 0;
-  }
+int RunAsHolder(const BridgeArguments& arguments, SiteStreams& streams, SiteLease& lease) {
   LcmBus bus(arguments.bus);
   JournalFirstBus journal_first(bus, WallUtime());
   CoreBridge core(journal_first, streams, lease);
   const int code = RunProcess(bus, core, [&](int64_t now) { journal_first.Poll(now); });
   lease.Release();
   return code;
+}
+
+// `waits`: for the lease, while another host has it. Otherwise this host had it before, and only
+// waits while NATS does not answer.
+int RunCore(const BridgeArguments& arguments, SiteStreams& streams, bool waits) {
+  streams.Make(arguments.replicas);
+  SiteLease lease(streams, arguments.holder);
+  const auto decided = [&] {
+    return lease.TryAcquire(WallUtime()) || (!waits && lease.is_anothers());
+  };
+  if (!Wait(decided, [&] { return fmt::format("waits for the site: {}", lease.seen_holder()); })) {
+    return 0;
+  }
+  if (lease.is_anothers()) {
+    Log(kProgram, fmt::format("another core has the site: {}", lease.seen_holder()));
+    return 0;
+  }
+  try {
+    return RunAsHolder(arguments, streams, lease);
+  } catch (const LeaseLost& lost) {
+    Log(kProgram, lost.what());
+    return 0;
+  }
 }
 
 int RunWorker(const BridgeArguments& arguments, SiteStreams& streams) {

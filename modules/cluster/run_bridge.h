@@ -21,8 +21,8 @@ struct BridgeArguments {
   std::string holder;             // of the lease; empty: a random name; a core waits for the lease
 };
 
-// Runs until a signal; a standby also ends when this host has become the site's core. Returns the
-// exit code. Throws std::runtime_error.
+// Runs until a signal; a standby also ends when this host has become the site's core, and a core
+// when another host has. Returns the exit code, 0 in these cases. Throws std::runtime_error.
 int RunBridge(BridgeArguments arguments);
 
 }  // namespace pangea

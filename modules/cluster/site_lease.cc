@@ -50,6 +50,10 @@ bool SiteLease::TryAcquire(int64_t now_utime) {
   return true;
 }
 
+bool SiteLease::is_anothers() const {
+  return seen_ > 0u && seen_holder_ != kNobody && seen_holder_ != holder_;
+}
+
 bool SiteLease::Renew(int64_t now_utime) {
   if (now_utime - renewed_utime_ < kRenew_us || Write(holder_, sequence_, now_utime)) {
     return true;

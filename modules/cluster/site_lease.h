@@ -53,6 +53,8 @@ class SiteLease {
   // The term with which the lease was taken.
   uint64_t term() const { return term_; }
   bool fresh(int64_t now_utime) const { return now_utime - renewed_utime_ < kFresh_us; }
+  // Whether the newest record that TryAcquire has seen is another host's.
+  bool is_anothers() const;
   // For people: the last known holder.
   const std::string& seen_holder() const { return seen_holder_; }
 

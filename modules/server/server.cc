@@ -108,13 +108,13 @@ std::vector<std::string> ReviveAll(KeptProcesses* kept) {
   return given_up;
 }
 
-// Runs until a signal comes or a process is given up, then stops all. Returns those given up.
-std::vector<std::string> KeepAlive(KeptProcesses* kept, const std::function<void()>& meanwhile) {
+// Runs until a signal comes, a process is given up, or `continues` is false, then stops all.
+// Returns those given up.
+std::vector<std::string> KeepAlive(KeptProcesses* kept, const std::function<bool()>& continues) {
   std::vector<std::string> given_up;
-  while (!StopRequested() && given_up.empty()) {
-    std::this_thread::sleep_for(kServerLookInterval);
+  while (!StopRequested() && given_up.empty() && continues()) {
     given_up = ReviveAll(kept);
-    meanwhile();
+    std::this_thread::sleep_for(kServerLookInterval);
   }
   kept->StopAll(kServerStopGrace_s);
   return given_up;
@@ -142,6 +142,49 @@ void SayUnusedOptions(const fs::path& folder) {
       Say(fmt::format("{}: no process reads it{}", file.string(), NearestWordHint(name, known)));
     }
   }
+}
+
+using Commands = std::vector<std::pair<std::string, std::vector<std::string>>>;
+
+// Of the processes that run on this host; those with a checkpoint are added to `checkpoints`.
+Commands ServerCommands(const ServerSetup& options, Checkpoints* checkpoints) {
+  Commands commands;
+  for (const std::string process : kServerProcesses) {
+    if (!options.cluster.nats.empty() && IsVerifier(process)) {
+      continue;
+    }
+    std::vector<std::string> argv = Command(process, options);
+    const std::vector<std::string> checkpoint = checkpoints->ArgumentsOf(process);
+    argv.insert(argv.end(), checkpoint.begin(), checkpoint.end());
+    checkpoints->Add(process, argv);
+    commands.emplace_back(process, std::move(argv));
+  }
+  return commands;
+}
+
+// Runs the server's processes until a signal comes, one is given up, or `continues` is false.
+// Returns those given up.
+std::vector<std::string> ServeOnce(const ServerSetup& options, const Commands& commands,
+                                   const std::function<bool(KeptProcesses&)>& continues) {
+  KeptProcesses kept(options.logs);
+  // The bridge starts first and ends last: only then may another host take the site.
+  if (!options.cluster.nats.empty()) {
+    Start(&kept, kBridge, BridgeCommand(BridgeRole::kCore, options.cluster, options.bus));
+  }
+  for (const auto& [process, argv] : commands) {
+    Start(&kept, process, argv);
+  }
+  if (options.phone_port) {
+    Start(&kept, kGateway, GatewayCommand(options));
+  }
+  Say(fmt::format("what they say is in {}; Ctrl-C ends them", fs::absolute(options.logs).string()));
+  return KeepAlive(&kept, [&] { return continues(kept); });
+}
+
+// A core's bridge ends by itself, without an error, when another host has the site.
+bool HasLostSite(KeptProcesses& kept) {
+  const auto exit = kept.Find(kBridge)->Poll();
+  return exit && exit->code == 0;
 }
 
 }  // namespace
@@ -184,35 +227,24 @@ int Serve(const ServerSetup& options) {
   fs::create_directories(options.logs);
   const bool is_core = !options.cluster.nats.empty();
   Checkpoints checkpoints(options.checkpoints, options.journal, options.logs);
-  std::vector<std::pair<std::string, std::vector<std::string>>> commands;
-  for (const std::string process : kServerProcesses) {
-    if (is_core && IsVerifier(process)) {
-      continue;
+  const Commands commands = ServerCommands(options, &checkpoints);
+  std::vector<std::string> given_up;
+  for (bool serves = true; serves;) {
+    if (is_core) {
+      Say(fmt::format("stands by until this host has the site; see {}/bridge.txt",
+                      fs::absolute(options.logs).string()));
+      if (!StandBy(options.cluster, options.journal, options.logs, &checkpoints)) {
+        return 0;
+      }
     }
-    std::vector<std::string> argv = Command(process, options);
-    const std::vector<std::string> checkpoint = checkpoints.ArgumentsOf(process);
-    argv.insert(argv.end(), checkpoint.begin(), checkpoint.end());
-    checkpoints.Add(process, argv);
-    commands.emplace_back(process, std::move(argv));
+    bool lost_site = false;
+    given_up = ServeOnce(options, commands, [&](KeptProcesses& kept) {
+      checkpoints.Tick(SteadySeconds());
+      lost_site = is_core && HasLostSite(kept);
+      return !lost_site;
+    });
+    serves = lost_site;
   }
-  KeptProcesses kept(options.logs);
-  if (is_core) {
-    Say(fmt::format("stands by until this host has the site; see {}/bridge.txt",
-                    fs::absolute(options.logs).string()));
-    if (!StandBy(options.cluster, options.journal, options.logs, &checkpoints)) {
-      return 0;
-    }
-    // The bridge starts first and ends last: only then may another host take the site.
-    Start(&kept, kBridge, BridgeCommand(BridgeRole::kCore, options.cluster, options.bus));
-  }
-  for (const auto& [process, argv] : commands) {
-    Start(&kept, process, argv);
-  }
-  if (options.phone_port) {
-    Start(&kept, kGateway, GatewayCommand(options));
-  }
-  Say(fmt::format("what they say is in {}; Ctrl-C ends them", fs::absolute(options.logs).string()));
-  const auto given_up = KeepAlive(&kept, [&] { checkpoints.Tick(SteadySeconds()); });
   for (const std::string& process : given_up) {
     if (checkpoints.Drop(process)) {
       Say(fmt::format("removed the checkpoint of {}: it starts from the journal next time",
@@ -234,7 +266,7 @@ int ServeAsWorker(const ServerSetup& options) {
     Start(&kept, verifier, Command(verifier, options));
   }
   Say(fmt::format("what they say is in {}; Ctrl-C ends them", fs::absolute(options.logs).string()));
-  return KeepAlive(&kept, [] {}).empty() ? 0 : 1;
+  return KeepAlive(&kept, [] { return true; }).empty() ? 0 : 1;
 }
 
 }  // namespace pangea
