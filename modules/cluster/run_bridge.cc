@@ -67,10 +67,12 @@ int RunAsHolder(const BridgeArguments& arguments, SiteStreams& streams, SiteLeas
   return code;
 }
 
-// `waits`: for the lease, while another host has it. Otherwise this host had it before, and only
-// waits while NATS does not answer.
+// `waits`: for the lease, while another host has it. Otherwise a standby of this host took it, and
+// has made the streams; this bridge only waits while NATS does not answer.
 int RunCore(const BridgeArguments& arguments, SiteStreams& streams, bool waits) {
-  streams.Make(arguments.replicas);
+  if (waits) {
+    streams.Make(arguments.replicas);
+  }
   SiteLease lease(streams, arguments.holder);
   const auto decided = [&] {
     return lease.TryAcquire(WallUtime()) || (!waits && lease.is_anothers());

@@ -17,6 +17,9 @@ namespace pangea {
 namespace {
 
 constexpr int64_t kRetry_ms = 500;
+// For questions that are asked again anyway: a stream without a leader does not answer them, and the
+// caller has more to do.
+constexpr int64_t kQuestion_ms = 500;
 constexpr int64_t kNanosecondsPerMicrosecond = 1000;
 constexpr int64_t kMaxUnacknowledged = 100'000;  // NATS' own default would stop a large cluster
 constexpr char kUtimeHeader[] = "Pangea-Utime";
@@ -28,6 +31,13 @@ constexpr std::chrono::seconds kLongestChoice{20};
 std::vector<uint8_t> DataOf(const natsMsg* message) {
   const char* const data = natsMsg_GetData(message);
   return {data, data + natsMsg_GetDataLength(message)};
+}
+
+jsOptions QuestionOptions() {
+  jsOptions options{};
+  jsOptions_Init(&options);
+  options.Wait = kQuestion_ms;
+  return options;
 }
 
 // Whether this is a status and not a message: JetStream's answer when it has no message.
@@ -209,9 +219,10 @@ std::optional<uint64_t> NatsClient::LastSequence(const std::string& stream) {
   if (!connected()) {
     return std::nullopt;
   }
+  jsOptions options = QuestionOptions();
   jsStreamInfo* got = nullptr;
   const natsStatus status =
-      js_GetStreamInfo(&got, impl_->context.get(), stream.c_str(), nullptr, nullptr);
+      js_GetStreamInfo(&got, impl_->context.get(), stream.c_str(), &options, nullptr);
   const NatsOwned<jsStreamInfo> info(got);
   return status == NATS_OK ? std::optional(info->State.LastSeq) : std::nullopt;
 }
@@ -301,9 +312,10 @@ std::optional<NatsClient::QueueState> NatsClient::StateOf(const std::string& str
   if (!connected()) {
     return std::nullopt;
   }
+  jsOptions options = QuestionOptions();
   jsConsumerInfo* got = nullptr;
   const natsStatus status = js_GetConsumerInfo(&got, impl_->context.get(), stream.c_str(),
-                                               consumer.c_str(), nullptr, nullptr);
+                                               consumer.c_str(), &options, nullptr);
   const NatsOwned<jsConsumerInfo> info(got);
   if (status != NATS_OK) {
     return std::nullopt;

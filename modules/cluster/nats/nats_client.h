@@ -1,8 +1,8 @@
 #pragma once
 
 // A client of NATS with JetStream over libnats, with the functions that the bridges need. Calls are
-// synchronous; not thread safe. A call returns a failure if NATS does not answer within kTimeout_ms
-// or there is no connection; it may then be repeated. The client reconnects by itself.
+// synchronous; not thread safe. A call returns a failure if NATS does not answer within kTimeout_ms,
+// or less, or there is no connection; it may then be repeated. The client reconnects by itself.
 
 #include <cstdint>
 #include <memory>

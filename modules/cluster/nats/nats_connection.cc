@@ -9,7 +9,9 @@ namespace pangea {
 namespace {
 
 constexpr int64_t kReconnectWait_ms = 500;
-constexpr int64_t kPing_ms = 2000;  // to notice that a host is gone
+constexpr int64_t kReconnectJitter_ms = 100;  // that of libnats for TLS is a second
+// To notice that a host is gone, which is so after two pings without an answer.
+constexpr int64_t kPing_ms = 1000;
 // More than the largest event of a journal; nats-server's own default is four times as much.
 constexpr int64_t kMinPayload = 256 * 1024;
 
@@ -53,6 +55,7 @@ NatsOwned<natsOptions> OptionsOf(const NatsAccess& access, const std::string& na
   natsOptions_SetTimeout(made, timeout_ms);
   natsOptions_SetMaxReconnect(made, -1);
   natsOptions_SetReconnectWait(made, kReconnectWait_ms);
+  natsOptions_SetReconnectJitter(made, kReconnectJitter_ms, kReconnectJitter_ms);
   natsOptions_SetPingInterval(made, kPing_ms);
   const std::vector<std::string> urls = access.Urls();
   std::vector<const char*> servers;
