@@ -150,6 +150,35 @@ TEST_F(Access, AWorkerStoresResultsAndNothingElse) {
   EXPECT_TRUE(worker.Acknowledge(delivery->ack_subject));
 }
 
+TEST_F(Access, AnEdgeCarriesPacketsOfTheLinkAndNothingElse) {
+  SiteStreams core(As("core"), "hall");
+  core.Make();
+  ASSERT_EQ(core.StoreEvent("OPTIONS_fusion", 7, std::vector<uint8_t>{1}, 0).stored,
+            SiteStreams::Stored::kNew);
+  SiteStreams as_edge(As("edge"), "hall");
+  EXPECT_FALSE(as_edge.EventAt(1).has_value());
+  EXPECT_FALSE(as_edge.AreThere());
+  NatsClient server(As("core"), "server"), edge(As("edge"), "edge"), other(As("edge"), "other");
+  server.Listen("pangea.hall.link.up.*");
+  other.Listen("pangea.hall.link.down.*");
+  const auto hears = [](NatsClient& client, const std::string& subject) {
+    std::optional<NatsClient::Heard> heard;
+    for (int i = 0; i < 50 && !heard; ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      heard = client.NextHeard(subject);
+    }
+    return heard ? heard->subject : "";
+  };
+  EXPECT_EQ(hears(server, "pangea.hall.link.up.*"), "");
+  const std::vector<uint8_t> packet{1, 2};
+  edge.Publish("pangea.hall.link.down.7", packet);
+  edge.Publish("pangea.hall.link.up.7", packet);
+  EXPECT_EQ(hears(server, "pangea.hall.link.up.*"), "pangea.hall.link.up.7");
+  EXPECT_EQ(hears(other, "pangea.hall.link.down.*"), "");
+  server.Publish("pangea.hall.link.down.7", packet);
+  EXPECT_EQ(hears(other, "pangea.hall.link.down.*"), "pangea.hall.link.down.7");
+}
+
 // Its key is kept on no host; without it, a further host would get another authority than the
 // others have.
 TEST(NatsConfig, AnAuthorityIsNotReplacedWhenItsKeyIsElsewhere) {

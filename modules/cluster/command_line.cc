@@ -1,8 +1,12 @@
 #include "cluster/command_line.h"
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 
+#include "bus/bus.h"
 #include "cluster/run_bridge.h"
+#include "link/wire.h"
 #include "options/command_line.h"
 
 namespace pangea::cluster {
@@ -12,14 +16,17 @@ int RunCommandLine(int argc, char** argv) {
   BridgeArguments arguments;
   app.add_option("--role", arguments.role,
                  "core: beside the server; worker: beside fusion and inter_map_ba; standby: until "
-                 "this host may be the core")
+                 "this host may be the core; edge: for agents on another network than the server; "
+                 "link: the edges' other end, on the server's link bus")
       ->required()
-      ->check(CLI::IsMember({"core", "worker", "standby"}));
+      ->check(CLI::IsMember({"core", "worker", "standby", "edge", "link"}));
   app.add_option("--site", arguments.site, "name of the site: bridges of one name work together")
       ->required();
-  app.add_option("--bus", arguments.bus,
-                 "LCM URL: core: of the server bus; worker: of a bus of its own")
-      ->capture_default_str();
+  app.add_option(
+      "--bus", arguments.bus,
+      fmt::format("LCM URL: core: of the server bus; worker: of a bus of its own (default: "
+                  "{}); edge, link: of the link bus (default: {})",
+                  kDefaultBusUrl, kDefaultLinkUrl));
   app.add_option("--nats", arguments.nats.url,
                  "URL of nats-server, with JetStream; of a cluster several, with commas between")
       ->capture_default_str();

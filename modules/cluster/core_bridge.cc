@@ -138,9 +138,9 @@ void CoreBridge::PublishResults() {
 }
 
 void CoreBridge::PublishOptions() {
-  while (const auto data = streams_.NextOptions()) {
+  while (const auto heard = streams_.NextOptions()) {
     options_t options{};
-    if (DecodeMessage(*data, &options)) {
+    if (DecodeMessage(heard->data, &options)) {
       node_.Publish(channels::Options(options.process), options);
     }
   }

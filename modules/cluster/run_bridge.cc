@@ -13,9 +13,11 @@
 #include "bus/process.h"
 #include "bus/status_log.h"
 #include "cluster/core_bridge.h"
+#include "cluster/link_bridge.h"
 #include "cluster/standby.h"
 #include "cluster/worker_bridge.h"
 #include "journal_follower/journal_first.h"
+#include "link/wire.h"
 
 namespace pangea {
 namespace {
@@ -102,12 +104,27 @@ int RunWorker(const BridgeArguments& arguments, SiteStreams& streams) {
   return RunProcess(bus, worker);
 }
 
+// Needs no streams, so an edge may have a user without rights for them.
+int RunLink(const BridgeArguments& arguments, LinkBridge::End end) {
+  NatsClient nats(arguments.nats, fmt::format("pangea-bridge {}", arguments.role));
+  LcmBus bus(arguments.bus, LcmBus::Fragments::kRefused);
+  LinkBridge link(bus, nats, arguments.site, end);
+  return RunProcess(bus, link);
+}
+
 }  // namespace
 
 int RunBridge(BridgeArguments arguments) {
-  SiteStreams streams(arguments.nats, arguments.site);
+  const bool edge = arguments.role == "edge", carries_link = edge || arguments.role == "link";
+  if (arguments.bus.empty()) {
+    arguments.bus = carries_link ? kDefaultLinkUrl : kDefaultBusUrl;
+  }
   StartLog(kProgram, fmt::format("{} of site {}, bus {}, NATS {}", arguments.role, arguments.site,
                                  arguments.bus, arguments.nats.url));
+  if (carries_link) {
+    return RunLink(arguments, edge ? LinkBridge::End::kEdge : LinkBridge::End::kServer);
+  }
+  SiteStreams streams(arguments.nats, arguments.site);
   const bool drawn = arguments.holder.empty();
   arguments.holder = drawn ? DrawnHolder() : arguments.holder;
   if (arguments.role == "standby") {

@@ -11,9 +11,9 @@
 namespace pangea {
 
 struct BridgeArguments {
-  std::string role;  // core, worker or standby
+  std::string role;  // core, worker, standby, edge or link
   std::string site;
-  std::string bus = kDefaultBusUrl;
+  std::string bus;  // empty: the default of the server bus, or of the link bus
   NatsAccess nats;
   int replicas = 0;               // of the streams; 0: keep the number
   size_t max_matches = 4;         // that a worker takes at a time

@@ -22,7 +22,8 @@ constexpr char kTerm[] = "term";  // used like a channel; real channels have cap
 constexpr char kWorkers[] = "workers";
 constexpr size_t kMaxSiteName = 40;
 
-// The site's name must be valid, because it becomes a part of subjects and stream names.
+}  // namespace
+
 std::string CheckedSite(const std::string& site) {
   const bool good = !site.empty() && site.size() <= kMaxSiteName &&
                     std::ranges::all_of(site, [](unsigned char c) {
@@ -34,6 +35,8 @@ std::string CheckedSite(const std::string& site) {
   }
   return site;
 }
+
+namespace {
 
 // The end of a keyframe's subject, after "journal.": the channel, opened_utime and seq.
 std::string KeyframeTokens(const KeyframeId& id) {

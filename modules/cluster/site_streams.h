@@ -29,6 +29,10 @@
 
 namespace pangea {
 
+// The name, which becomes a part of subjects and stream names; throws std::runtime_error if it
+// cannot.
+std::string CheckedSite(const std::string& site);
+
 class SiteStreams : public LeaseRecords {
  public:
   // If a worker is silent for this time, other workers get its matches.
@@ -119,10 +123,10 @@ class SiteStreams : public LeaseRecords {
   bool HeardOfStored(Kind kind);
   void PublishHave(Bytes data);
   void ListenToHave();
-  std::optional<std::vector<uint8_t>> NextHave() { return nats_.NextHeard(HaveSubject()); }
+  std::optional<NatsClient::Heard> NextHave() { return nats_.NextHeard(HaveSubject()); }
   void PublishOptions(const std::string& process, Bytes data);
   void ListenToOptions();
-  std::optional<std::vector<uint8_t>> NextOptions() { return nats_.NextHeard(OptionsSubject("*")); }
+  std::optional<NatsClient::Heard> NextOptions() { return nats_.NextHeard(OptionsSubject("*")); }
 
  private:
   std::string Stream(const std::string& kind) const;

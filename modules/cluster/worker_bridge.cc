@@ -166,9 +166,9 @@ void WorkerBridge::PassKeyframes(int64_t now_utime) {
 // HAVE is published only after its keyframes, because verifiers ask for all keyframes that they
 // lack.
 void WorkerBridge::PassHave() {
-  while (const auto data = streams_.NextHave()) {
+  while (const auto heard = streams_.NextHave()) {
     if (has_keyframes_) {
-      node_.bus().Publish(std::string(channels::kHave), *data);
+      node_.bus().Publish(std::string(channels::kHave), heard->data);
     }
   }
 }

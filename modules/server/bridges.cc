@@ -26,6 +26,8 @@ const char* NameOf(BridgeRole role) {
       return "core";
     case BridgeRole::kStandby:
       return "standby";
+    case BridgeRole::kLink:
+      return "link";
     default:
       return "worker";
   }
@@ -53,7 +55,7 @@ std::vector<std::string> BridgeCommand(BridgeRole role, const ClusterOptions& op
   add("--credentials", options.credentials.string());
   if (role == BridgeRole::kWorker) {
     add("--matches", std::to_string(options.max_matches));
-  } else {
+  } else if (role != BridgeRole::kLink) {
     add("--holder", options.holder);
     add("--replicas", options.replicas > 0 ? std::to_string(options.replicas) : "");
   }

@@ -19,12 +19,13 @@ struct ClusterOptions {
   std::string site;        // name of the site in NATS
   std::string holder;      // holder of the lease
   size_t max_matches = 4;  // of a worker, at a time
+  bool edges = false;      // agents may come over edges
 };
 
 // A unique name.
 std::string DrawHolder();
 
-enum class BridgeRole { kCore, kStandby, kWorker };
+enum class BridgeRole { kCore, kStandby, kWorker, kLink };
 // `journal`: only for kStandby.
 std::vector<std::string> BridgeCommand(BridgeRole role, const ClusterOptions& options,
                                        const std::string& bus,

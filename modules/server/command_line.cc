@@ -51,15 +51,19 @@ void AddFolders(CLI::App& app, CLI::Option* site, Arguments* arguments) {
 
 void AddSeveralHosts(CLI::App& app, CLI::Option* site, Arguments* arguments) {
   ServerSetup& options = arguments->options;
-  app.add_option("--nats", options.cluster.nats,
-                 "several hosts, by NATS at this URL (docs/cluster.md): serves once this host has "
-                 "the site; workers verify");
+  CLI::Option* nats = app.add_option(
+      "--nats", options.cluster.nats,
+      "several hosts, by NATS at this URL (docs/cluster.md): serves once this host has "
+      "the site; workers verify");
   app.add_option("--ca", options.cluster.ca, "of --nats tls://: certificate of its authority");
   app.add_option("--credentials", options.cluster.credentials,
                  "of --nats: file with user and password, mode 0600");
   app.add_option("--replicas", options.cluster.replicas,
                  "nodes of NATS that have each message (default: as the streams are)")
       ->check(CLI::Range(1, 5));
+  app.add_flag("--edges", options.cluster.edges,
+               "agents may come over edges: hosts with pangea-bridge --role edge")
+      ->needs(nats);
   app.add_option("--worker", arguments->worker,
                  "a worker alone: verifies for the server of the site of this name")
       ->excludes(site);

@@ -28,6 +28,7 @@ namespace fs = std::filesystem;
 constexpr double kServerStopGrace_s = 5;
 constexpr const char* kGateway = "gateway";
 constexpr const char* kBridge = "bridge";
+constexpr const char* kEdges = "edges";
 constexpr const char* kThinningOptions = "thinning.yaml";  // of pangea-site compact
 // Processes that workers run, and a server on several hosts does not.
 constexpr const char* kVerifiers[] = {"fusion", "inter_map_ba"};
@@ -170,6 +171,9 @@ std::vector<std::string> ServeOnce(const ServerSetup& options, const Commands& c
   // The bridge starts first and ends last: only then may another host take the site.
   if (!options.cluster.nats.empty()) {
     Start(&kept, kBridge, BridgeCommand(BridgeRole::kCore, options.cluster, options.bus));
+  }
+  if (options.cluster.edges) {
+    Start(&kept, kEdges, BridgeCommand(BridgeRole::kLink, options.cluster, options.link));
   }
   for (const auto& [process, argv] : commands) {
     Start(&kept, process, argv);

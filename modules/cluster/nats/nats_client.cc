@@ -17,8 +17,8 @@ namespace pangea {
 namespace {
 
 constexpr int64_t kRetry_ms = 500;
-// For questions that are asked again anyway: a stream without a leader does not answer them, and the
-// caller has more to do.
+// For questions that are asked again anyway: a stream without a leader does not answer them, and
+// the caller has more to do.
 constexpr int64_t kQuestion_ms = 500;
 constexpr int64_t kNanosecondsPerMicrosecond = 1000;
 constexpr int64_t kMaxUnacknowledged = 100'000;  // NATS' own default would stop a large cluster
@@ -338,7 +338,7 @@ void NatsClient::Listen(const std::string& subject) {
   impl_->Check(status, jsErrCode(0), subject);
 }
 
-std::optional<std::vector<uint8_t>> NatsClient::NextHeard(const std::string& subject) {
+std::optional<NatsClient::Heard> NatsClient::NextHeard(const std::string& subject) {
   natsSubscription* const heard = impl_->heard.at(subject).get();
   uint64_t waiting = 0;
   if (natsSubscription_QueuedMsgs(heard, &waiting) != NATS_OK || waiting == 0) {
@@ -347,7 +347,8 @@ std::optional<std::vector<uint8_t>> NatsClient::NextHeard(const std::string& sub
   natsMsg* got = nullptr;
   const natsStatus status = natsSubscription_NextMsg(&got, heard, 1);
   const NatsOwned<natsMsg> message(got);
-  return status == NATS_OK ? std::optional(DataOf(got)) : std::nullopt;
+  return status == NATS_OK ? std::optional(Heard{natsMsg_GetSubject(got), DataOf(got)})
+                           : std::nullopt;
 }
 
 }  // namespace pangea

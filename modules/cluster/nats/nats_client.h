@@ -1,8 +1,9 @@
 #pragma once
 
 // A client of NATS with JetStream over libnats, with the functions that the bridges need. Calls are
-// synchronous; not thread safe. A call returns a failure if NATS does not answer within kTimeout_ms,
-// or less, or there is no connection; it may then be repeated. The client reconnects by itself.
+// synchronous; not thread safe. A call returns a failure if NATS does not answer within
+// kTimeout_ms, or less, or there is no connection; it may then be repeated. The client reconnects
+// by itself.
 
 #include <cstdint>
 #include <memory>
@@ -98,7 +99,11 @@ class NatsClient {
   // `subject` as given to Listen.
   void Publish(const std::string& subject, Bytes data);
   void Listen(const std::string& subject);
-  std::optional<std::vector<uint8_t>> NextHeard(const std::string& subject);
+  struct Heard {
+    std::string subject;  // without wildcards
+    std::vector<uint8_t> data;
+  };
+  std::optional<Heard> NextHeard(const std::string& subject);
 
  private:
   struct Impl;
