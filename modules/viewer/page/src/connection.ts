@@ -7,7 +7,6 @@ const kRetry_ms = 1000;
 
 export class Connection {
   bytes = 0; // received since the page was opened
-  open = false;
   private socket?: WebSocket;
 
   constructor(
@@ -17,10 +16,11 @@ export class Connection {
     this.connect();
   }
 
-  // False if there is no connection.
+  // False if there is no connection, or it is about to end.
   say(said: Said): boolean {
-    if (this.open) this.socket?.send(JSON.stringify(said));
-    return this.open;
+    if (this.socket?.readyState !== WebSocket.OPEN) return false;
+    this.socket.send(JSON.stringify(said));
+    return true;
   }
 
   private connect() {
@@ -28,7 +28,6 @@ export class Connection {
     this.socket = socket;
     socket.binaryType = "arraybuffer";
     socket.onopen = () => {
-      this.open = true;
       this.onState(true);
     };
     socket.onmessage = ({ data }: MessageEvent<ArrayBuffer>) => {
@@ -41,7 +40,6 @@ export class Connection {
       }
     };
     socket.onclose = () => {
-      this.open = false;
       this.onState(false);
       setTimeout(() => this.connect(), kRetry_ms);
     };

@@ -47,7 +47,7 @@ export class GatewayLink {
 
   // False if the packet was not sent; the link sends it again later.
   send(packet: Uint8Array): boolean {
-    if (this.state !== "open" || !this.socket || this.socket.bufferedAmount > kMaxWaiting_bytes) return false;
+    if (this.state !== "open" || this.socket?.readyState !== WebSocket.OPEN || this.socket.bufferedAmount > kMaxWaiting_bytes) return false;
     this.socket.send(packet as Uint8Array<ArrayBuffer>);
     return true;
   }

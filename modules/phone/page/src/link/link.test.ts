@@ -67,6 +67,11 @@ test("a socket that says nothing for ten seconds is given up for a new one", asy
   socket.says(100);
   mock.timers.tick(9_000);
   assert.deepEqual([link.state, packets], ["open", [100]]);
+  assert.ok(link.send(new Uint8Array(5)));
+  const { length } = socket.sent;
+  socket.readyState = 2; // it is closing
+  assert.ok(!link.send(new Uint8Array(5)));
+  assert.equal(socket.sent.length, length);
   mock.timers.tick(1_000);
   assert.equal(link.state, "connecting");
   socket.says(50); // too late: it must be ignored
