@@ -17,8 +17,7 @@
 #include <string>
 #include <vector>
 
-#include "core/keyframe.h"
-#include "core/server_messages.h"
+#include "bench/cores/step.h"
 
 namespace pangea::bench {
 
@@ -28,13 +27,6 @@ struct CityOptions {
   int alike_cells = 2;  // one in this many cells is alike
   // Halls are rooms of one building: a known constraint connects each to the next.
   bool joined = false;
-};
-
-// A keyframe with its match and verification results.
-struct Step {
-  Keyframe keyframe;
-  PlaceMatch match;
-  std::vector<Constraint> results;
 };
 
 class City {

@@ -12,8 +12,8 @@
 #include <string>
 #include <vector>
 
+#include "bench/cores/cores.h"
 #include "bench/scale_city/city.h"
-#include "bench/scale_city/cores.h"
 #include "bus/process.h"
 #include "eval/metrics.h"
 #include "messages/channels.h"
@@ -101,7 +101,8 @@ class Bench {
     for (const Keyframe& keyframe : city_.Walk(hall, arguments_.visits)) {
       map = keyframe.id.map;
       ++keyframes;
-      for (const Constraint& result : cores_.Take(keyframe)) {
+      const Step step = cores_.Take(keyframe);
+      for (const Constraint& result : step.results) {
         ++(result.accepted ? accepted : refused);
         wrong += city_.IsWrong(result) ? 1 : 0;
       }

@@ -6,10 +6,11 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "bench/cores/step.h"
 #include "bench/process_use.h"
-#include "bench/scale_city/city.h"
 #include "core/group_states.h"
 #include "global_ba/global_ba.h"
 #include "loop_verification/loop_verifier.h"
@@ -26,18 +27,19 @@ class Cores {
 
   // Adds a keyframe with its results, as from a journal.
   void Remember(const Step& step);
-  // Solves every group, and marks its keyframes as adjusted, as in a city that has existed for
-  // long. `adjust`: adjusts them really.
+  // Solves every group, and marks its keyframes as adjusted, as on a server that has run for long.
+  // `adjust`: adjusts them really.
   void Start(bool adjust);
 
-  // Processes a keyframe from an agent; returns the results of its candidates.
-  std::vector<Constraint> Take(const Keyframe& keyframe);
+  // Processes a keyframe from an agent; returns it with its match and results.
+  Step Take(const Keyframe& keyframe);
   // The work when no more messages come: solves everything anew, and adjusts the groups that have
   // changed since Start.
   void Quiet();
 
   // The newest state of the map's group; null if there is none yet.
   const MapState* StateOf(const MapId& map) const { return states_.Find(map); }
+  std::vector<MapState> States() const { return graph_->States(); }
   std::map<std::string, Use> TakeUse() { return use_.Take(); }
   // CPU time of the pose graph's longest work on a keyframe since the last call.
   double TakeLongestSolve_ms() { return std::exchange(longest_solve_ms_, 0); }

@@ -1,4 +1,4 @@
-#include "bench/scale_city/cores.h"
+#include "bench/cores/cores.h"
 
 #include <algorithm>
 #include <utility>
@@ -78,7 +78,7 @@ void Cores::Tell(const PoseGraphUpdate& update) {
     states_.Take(state);
     use_.Measure("place_recognition", [&] { recognition_->Take(state); });
     use_.Measure("map_points", [&] { map_points_->Take(state); });
-    // The city's groups were adjusted long ago.
+    // The groups of Start were adjusted long ago.
     if (started_) {
       use_.Measure("global_ba", [&] { global_ba_->Take(state); });
     }
@@ -92,11 +92,11 @@ Constraint Cores::Verify(const KeyframeId& query, const PlaceCandidate& candidat
   return use_.Measure("fusion", [&] { return fusion_->Verify(query, candidate); });
 }
 
-std::vector<Constraint> Cores::Take(const Keyframe& keyframe) {
+Step Cores::Take(const Keyframe& keyframe) {
   const PlaceMatch match =
       use_.Measure("place_recognition", [&] { return recognition_->Add(keyframe); });
   if (recognition_alone_) {
-    return {};
+    return {keyframe, match, {}};
   }
   use_.Measure("inter_map_ba", [&] { inter_map_ba_->Add(keyframe); });
   use_.Measure("fusion", [&] { fusion_->Add(keyframe); });
@@ -121,7 +121,7 @@ std::vector<Constraint> Cores::Take(const Keyframe& keyframe) {
   longest_solve_ms_ = std::max(longest_solve_ms_, CpuMs() - begin_ms);
   Tell(update);
   SendPoints(keyframe);
-  return results;
+  return {keyframe, match, results};
 }
 
 void Cores::SendPoints(const Keyframe& keyframe) {
