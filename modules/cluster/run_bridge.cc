@@ -60,7 +60,18 @@ int RunStandby(const BridgeArguments& arguments, SiteStreams& streams) {
   return is_core ? 0 : 1;
 }
 
+// A thread of its own, because the bridge's waits for streams that have no leader.
+std::jthread GiveSigns(SiteStreams& streams, const std::string& holder) {
+  return std::jthread([&streams, holder](const std::stop_token& stop) {
+    while (!stop.stop_requested()) {
+      streams.PublishSign(holder);
+      std::this_thread::sleep_for(std::chrono::microseconds(SiteLease::kSign_us));
+    }
+  });
+}
+
 int RunAsHolder(const BridgeArguments& arguments, SiteStreams& streams, SiteLease& lease) {
+  const std::jthread signs = GiveSigns(streams, arguments.holder);
   LcmBus bus(arguments.bus);
   JournalFirstBus journal_first(bus, WallUtime());
   CoreBridge core(journal_first, streams, lease);

@@ -31,23 +31,45 @@ bool SiteLease::Write(const std::string& record, uint64_t behind, int64_t now_ut
 
 bool SiteLease::TryAcquire(int64_t now_utime) {
   const auto newest = records_.LeaseSequence();
+  if (!newest) {
+    answers_utime_.reset();
+    return false;
+  }
+  answers_utime_ = answers_utime_.value_or(now_utime);
   if (newest != seen_) {
-    const auto holder = newest ? HolderAt(*newest) : std::nullopt;
-    if (newest && *newest > 0 && !holder) {
+    const auto holder = HolderAt(*newest);
+    if (*newest > 0 && !holder) {
       return false;  // somebody has it, and NATS does not say who
+    }
+    if (seen_holder_ != holder.value_or(kNobody)) {
+      seen_holder_ = holder.value_or(kNobody);
+      sign_utime_.reset();
     }
     seen_ = newest;
     seen_utime_ = now_utime;
-    seen_holder_ = holder.value_or(kNobody);
   }
-  const bool free = newest && (seen_holder_ == kNobody || seen_holder_ == holder_ ||
-                               now_utime - seen_utime_ >= kHeld_us);
-  if (!free || !Write(holder_, *newest, now_utime)) {
+  if (!IsFree(now_utime) || !Write(holder_, *newest, now_utime)) {
     return false;
   }
   term_ = sequence_;
   seen_holder_ = holder_;
   return true;
+}
+
+bool SiteLease::IsFree(int64_t now_utime) const {
+  if (seen_holder_ == kNobody || seen_holder_ == holder_) {
+    return true;
+  }
+  const int64_t answers_us = now_utime - *answers_utime_;
+  const int64_t unchanged_us = now_utime - seen_utime_;
+  const bool fell_silent = sign_utime_ && now_utime - *sign_utime_ >= kHeld_us;
+  return unchanged_us >= kHeld_us && answers_us >= (fell_silent ? kHeard_us : kHeld_us);
+}
+
+void SiteLease::NoteSign(const std::string& holder, int64_t now_utime) {
+  if (holder == seen_holder_) {
+    sign_utime_ = now_utime;
+  }
 }
 
 bool SiteLease::is_anothers() const {

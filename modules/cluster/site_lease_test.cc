@@ -18,6 +18,9 @@ constexpr int64_t kSecond = 1'000'000;  // microseconds
 class LaggingRecords : public LeaseRecords {
  public:
   std::optional<uint64_t> LeaseSequence() override {
+    if (no_leader) {
+      return std::nullopt;
+    }
     return records_.size() - (former_leader ? lag : 0);
   }
   std::optional<NatsClient::Message> FindLease() override {
@@ -41,6 +44,7 @@ class LaggingRecords : public LeaseRecords {
 
   size_t lag = 0;  // records
   bool former_leader = false;
+  bool no_leader = false;
 
  private:
   std::vector<std::string> records_;
@@ -92,6 +96,39 @@ TEST_F(SiteLeaseTest, AFormerLeadersRecordDoesNotTakeItFromItsHolder) {
   records.former_leader = false;
   EXPECT_TRUE(second.Renew(now + kSecond));
   EXPECT_TRUE(second.fresh(now + kSecond));
+}
+
+// From the first look on, NATS chooses a leader for 5 s. Returns after how long `second` has the
+// lease; `signs_s`: how long signs of life of `first` come.
+double TakenAfter_s(LaggingRecords& records, SiteLease& second, double signs_s) {
+  const int64_t begin = 2 * kSecond;
+  EXPECT_FALSE(second.TryAcquire(begin));
+  for (int64_t at = 0; at < 20 * kSecond; at += kSecond / 10) {
+    if (static_cast<double>(at) < signs_s * kSecond) {
+      second.NoteSign("first", begin + at);
+    }
+    records.no_leader = at > 0 && at < 5 * kSecond;
+    if (second.TryAcquire(begin + at)) {
+      return static_cast<double>(at) / kSecond;
+    }
+  }
+  return 20;
+}
+
+TEST_F(SiteLeaseTest, WhoFellSilentBeforeNatsHadALeaderGetsNoMoreTime) {
+  ASSERT_TRUE(first.TryAcquire(kSecond));
+  EXPECT_NEAR(TakenAfter_s(records, second, 0.5), 5.6, 0.15);
+}
+
+TEST_F(SiteLeaseTest, WhoLivesHasTimeToRenewItWhenNatsHasALeader) {
+  ASSERT_TRUE(first.TryAcquire(kSecond));
+  EXPECT_NEAR(TakenAfter_s(records, second, 20), 9, 0.15);
+}
+
+// A bridge of an older version, or users that an older pangea-nats-config made.
+TEST_F(SiteLeaseTest, WhoNeverGaveASignHasTimeToRenewItToo) {
+  ASSERT_TRUE(first.TryAcquire(kSecond));
+  EXPECT_NEAR(TakenAfter_s(records, second, 0), 9, 0.15);
 }
 
 }  // namespace

@@ -85,6 +85,8 @@ std::string SiteStreams::HaveSubject() const { return fmt::format("pangea.{}.hav
 
 std::string SiteStreams::LeaseSubject() const { return fmt::format("pangea.{}.lease", site_); }
 
+std::string SiteStreams::SignSubject() const { return fmt::format("pangea.{}.alive", site_); }
+
 std::string SiteStreams::StoredSubject(Kind kind) const {
   const char* const name = kind == Kind::kKeyframe ? "keyframe"
                            : kind == Kind::kMatch  ? kMatch
@@ -160,6 +162,15 @@ SiteStreams::StoreAnswer SiteStreams::StoreLease(const std::string& record, uint
   return nats_.Store(LeaseSubject(),
                      {reinterpret_cast<const uint8_t*>(record.data()), record.size()},
                      {NatsClient::If::What::kNewestOfStream, behind});
+}
+
+void SiteStreams::PublishSign(const std::string& holder) {
+  nats_.Publish(SignSubject(), {reinterpret_cast<const uint8_t*>(holder.data()), holder.size()});
+}
+
+std::optional<std::string> SiteStreams::NextSign() {
+  const auto heard = nats_.NextHeard(SignSubject());
+  return heard ? std::optional(std::string(heard->data.begin(), heard->data.end())) : std::nullopt;
 }
 
 std::optional<SiteStreams::Message> SiteStreams::FindKeyframe(const KeyframeId& id) {

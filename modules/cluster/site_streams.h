@@ -7,6 +7,7 @@
 //   stream pangea-<site>-match,   subject pangea.<site>.match.<agent>.<opened_utime>.<seq>
 //   stream pangea-<site>-result,  subject pangea.<site>.result.<agent>.<opened_utime>.<seq>.<id>
 //   stream pangea-<site>-lease,   subject pangea.<site>.lease: the newest record counts
+//   subject pangea.<site>.alive: the name of the lease's holder, while its bridge runs
 //   subject pangea.<site>.have: the newest HAVE, only for clients that listen now
 //   subject pangea.<site>.options.<process>: OPTIONS_<process> of workers
 //   subject pangea.<site>.stored.<kind>: empty; somebody has stored a message (stream_watch.h)
@@ -80,6 +81,11 @@ class SiteStreams : public LeaseRecords {
   std::optional<Message> FindLease() override;
   StoreAnswer StoreLease(const std::string& record, uint64_t behind) override;
 
+  // Signs of life of the lease's holder (site_lease.h). PublishSign may be called on any thread.
+  void PublishSign(const std::string& holder);
+  void ListenToSigns() { nats_.Listen(SignSubject()); }
+  std::optional<std::string> NextSign();
+
   // Nothing if the message is not there, or NATS does not answer.
   std::optional<Message> FindKeyframe(const KeyframeId& id);
   std::optional<Message> FindMatch(const KeyframeId& query);
@@ -134,6 +140,7 @@ class SiteStreams : public LeaseRecords {
   std::string Subject(const std::string& kind, const KeyframeId& id) const;
   std::string HaveSubject() const;
   std::string LeaseSubject() const;
+  std::string SignSubject() const;
   std::string StoredSubject(Kind kind) const;
   std::string OptionsSubject(const std::string& process) const;
 

@@ -6,10 +6,15 @@ namespace pangea {
 
 Standby::Standby(const std::filesystem::path& journal, SiteStreams& streams,
                  const std::string& holder)
-    : journal_(journal), streams_(streams), lease_(streams, holder), copy_(journal, streams) {}
+    : journal_(journal), streams_(streams), lease_(streams, holder), copy_(journal, streams) {
+  streams_.ListenToSigns();
+}
 
 // The journal is followed again after the term is stored: until then the former core may write.
 bool Standby::Step(int64_t now_utime) {
+  while (const auto holder = streams_.NextSign()) {
+    lease_.NoteSign(*holder, now_utime);
+  }
   const bool more = copy_.Follow();
   if (begin_ == 0 && !more && lease_.TryAcquire(now_utime)) {
     begin_ = StoreTerm(streams_, lease_.term());

@@ -96,7 +96,7 @@ class NatsClient {
   std::optional<QueueState> StateOf(const std::string& stream, const std::string& consumer);
 
   // Publish reaches only clients that listen now, and may be lost. NextHeard does not wait;
-  // `subject` as given to Listen.
+  // `subject` as given to Listen. Publish may be called on any thread.
   void Publish(const std::string& subject, Bytes data);
   void Listen(const std::string& subject);
   struct Heard {
