@@ -43,6 +43,8 @@ class AgentHandler {
   void OnCorrection(const Correction& correction);
   // The acknowledgement to send now, if one is due. The session gives it its number.
   std::optional<LinkAck> TakeAck(int64_t now_us);
+  // Whether something came for which no ack was sent.
+  bool OwesAck() const { return ack_urgent_ || hello_since_ack_ || pieces_since_ack_ > 0; }
 
   const std::string& software() const { return software_; }
   const Receiver& receiver() const { return receiver_; }

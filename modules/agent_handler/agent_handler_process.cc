@@ -23,8 +23,10 @@ constexpr int kManyHellos = 3;
 // After this time without a hello the uplink counts as away: it sends one every second.
 constexpr int64_t kAway_us = 3 * kSecond_us;
 constexpr size_t kMaxStrangers = 10;
+// Waits for the next Poll. A message ends them, so of an idle link only repeats matter.
 constexpr int kBusy_ms = 4;
-constexpr int kIdle_ms = 20;
+constexpr int kAck_ms = 20;
+constexpr int kIdle_ms = 100;
 
 }  // namespace
 
@@ -272,11 +274,16 @@ int AgentHandlerProcess::Poll(int64_t steady_us) {
     SendAnchors();
   }
   archive_.AnswerResendRequests();
-  const bool busy =
-      archive_.busy() || std::any_of(agents_.begin(), agents_.end(), [](const auto& item) {
-        return item.second.handler && item.second.handler->receiver().pending() > 0;
-      });
-  return busy ? kBusy_ms : kIdle_ms;
+  const auto any_agent = [this](const auto& holds) {
+    return std::any_of(agents_.begin(), agents_.end(), [&holds](const auto& item) {
+      return item.second.handler && holds(*item.second.handler);
+    });
+  };
+  if (archive_.busy() ||
+      any_agent([](const AgentHandler& one) { return one.receiver().pending() > 0; })) {
+    return kBusy_ms;
+  }
+  return any_agent([](const AgentHandler& one) { return one.OwesAck(); }) ? kAck_ms : kIdle_ms;
 }
 
 void AgentHandlerProcess::LookForKeys() {

@@ -2,6 +2,7 @@
 
 #include <dlfcn.h>
 
+#include <algorithm>
 #include <atomic>
 #include <csignal>
 
@@ -41,10 +42,11 @@ void UseOneThread() {
 int RunProcess(LcmBus& bus, Process& process,
                const std::function<void(int64_t now_utime)>& between_messages) {
   InstallSignalHandlers();
-  int64_t next_tick = 0;
+  int64_t now = WallUtime(), next_tick = now;
   while (!StopRequested()) {
-    bus.Handle(process.longest_wait_ms());
-    const int64_t now = WallUtime();
+    const auto to_tick_ms = static_cast<int>((next_tick - now + 999) / 1000);
+    bus.Handle(std::clamp(process.longest_wait_ms(), 0, std::max(to_tick_ms, 0)));
+    now = WallUtime();
     if (between_messages) {
       between_messages(now);
     }

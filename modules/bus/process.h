@@ -18,10 +18,10 @@ class Process {
   // Housekeeping at about 10 Hz: resend requests, time-outs, status. A replay never calls it, so no
   // result may depend on it. `now_utime`: wall clock.
   virtual void Tick(int64_t now_utime) = 0;
-  // For a process that serves more than the bus. Called after each message, and when no message
-  // came for longest_wait_ms.
+  // For a process that serves more than the bus. Called after each message and tick, and when
+  // neither came for longest_wait_ms.
   virtual void BetweenMessages(int64_t) {}
-  virtual int longest_wait_ms() const { return 50; }
+  virtual int longest_wait_ms() const { return 100; }
 };
 
 // After InstallSignalHandlers, SIGINT and SIGTERM make StopRequested true.
