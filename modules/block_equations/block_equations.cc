@@ -43,7 +43,11 @@ std::vector<int> NeighboursBehind(int variable, const std::vector<Use>& uses,
 }  // namespace
 
 struct BlockEquations::Factor {
-  Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>, Eigen::Lower> cholesky;
+  struct Cholesky : Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>, Eigen::Lower> {
+    const cholmod_factor& L() const { return *m_cholmodFactor; }
+  };
+  Cholesky cholesky;
+  std::vector<int> row_of;  // of L, by column of H
 };
 
 BlockEquations::BlockEquations(const std::vector<int>& sizes,
@@ -60,6 +64,11 @@ BlockEquations::BlockEquations(const std::vector<int>& sizes,
   cholmod.method[0].ordering = CHOLMOD_AMD;
   if (num_columns() > 0) {
     factor_->cholesky.analyzePattern(H_);
+    const auto* const column_of = static_cast<const int*>(factor_->cholesky.L().Perm);
+    factor_->row_of.resize(num_columns());
+    for (int row = 0; row < num_columns(); ++row) {
+      factor_->row_of[column_of[row]] = row;
+    }
   }
 }
 
@@ -120,16 +129,64 @@ void BlockEquations::Damp(double share) {
   }
 }
 
-std::optional<Eigen::VectorXd> BlockEquations::Solve() {
+bool BlockEquations::Factorise() {
   if (num_columns() == 0) {
-    return Eigen::VectorXd();
+    return true;
   }
   factor_->cholesky.factorize(H_);
-  if (factor_->cholesky.info() != Eigen::Success) {
+  return factor_->cholesky.info() == Eigen::Success;
+}
+
+Eigen::VectorXd BlockEquations::SolveFactorised() const {
+  return num_columns() == 0 ? Eigen::VectorXd() : Eigen::VectorXd(factor_->cholesky.solve(-g_));
+}
+
+std::optional<Eigen::VectorXd> BlockEquations::Solve() {
+  if (!Factorise()) {
     return std::nullopt;
   }
-  Eigen::VectorXd x = factor_->cholesky.solve(-g_);
+  Eigen::VectorXd x = SolveFactorised();
   return x.allFinite() ? std::make_optional(std::move(x)) : std::nullopt;
+}
+
+// With P H P' = L L' it is Y' Y, L Y = P E, E: the variable's columns of the identity. Few rows of
+// Y are not zero: those on the paths of the elimination tree from the variable's columns to the
+// root (Davis, Direct Methods for Sparse Linear Systems, 2006, section 3.2). The columns are a
+// clique, so their paths are one. A supernode's parent has its first row below the diagonal block.
+Eigen::MatrixXd BlockEquations::InverseBlock(int variable) const {
+  using Eigen::Map, Eigen::MatrixXd, Eigen::OuterStride;
+  const cholmod_factor& L = factor_->cholesky.L();
+  const auto* super = static_cast<const int*>(L.super);
+  const auto* row_begin = static_cast<const int*>(L.pi);
+  const auto* value_begin = static_cast<const int*>(L.px);
+  const auto* rows = static_cast<const int*>(L.s);
+  const int size = ColumnOf(variable + 1) - ColumnOf(variable);
+  MatrixXd Y = MatrixXd::Zero(num_columns(), size);
+  int next = num_columns();
+  for (int k = 0; k < size; ++k) {
+    const int row = factor_->row_of[ColumnOf(variable) + k];
+    Y(row, k) = 1;
+    next = std::min(next, row);
+  }
+  MatrixXd block = MatrixXd::Zero(size, size);
+  while (next < num_columns()) {
+    const auto node = std::upper_bound(super, super + L.nsuper, next) - super - 1;
+    const int count = super[node + 1] - super[node];
+    const int num_rows = row_begin[node + 1] - row_begin[node];
+    const Map<const MatrixXd, 0, OuterStride<>> values(
+        static_cast<const double*>(L.x) + value_begin[node], num_rows, count,
+        OuterStride<>(num_rows));
+    auto y = Y.middleRows(super[node], count);
+    values.topRows(count).triangularView<Eigen::Lower>().solveInPlace(y);
+    block.noalias() += y.transpose() * y;
+    const MatrixXd below = values.bottomRows(num_rows - count) * y;
+    const int* const rows_below = rows + row_begin[node] + count;
+    for (int i = 0; i < num_rows - count; ++i) {
+      Y.row(rows_below[i]) -= below.row(i);
+    }
+    next = num_rows > count ? rows_below[0] : num_columns();
+  }
+  return block;
 }
 
 }  // namespace pangea

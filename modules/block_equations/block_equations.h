@@ -51,6 +51,13 @@ class BlockEquations {
   void Damp(double share);
   // Returns x; empty if H is not positive definite.
   std::optional<Eigen::VectorXd> Solve();
+  // The parts of Solve, to use one factor several times. False if H is not positive definite; then
+  // there is no factor.
+  bool Factorise();
+  // x for the present g, with the H of the last Factorise.
+  Eigen::VectorXd SolveFactorised() const;
+  // The diagonal block of a variable in the inverse of that H.
+  Eigen::MatrixXd InverseBlock(int variable) const;
 
  private:
   // Position of a block in the values of H: first value, and stride between its columns.

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <random>
 
 namespace pangea {
@@ -65,6 +66,23 @@ TEST(BlockEquations, SolvesAsDenseOnesDo) {
     const auto x = both.sparse.Solve();
     ASSERT_TRUE(x);
     EXPECT_LT((*x + both.H.llt().solve(both.g)).norm(), 1e-10 * x->norm());
+  }
+}
+
+TEST(BlockEquations, AFactorSolvesForOtherGradientsAndGivesBlocksOfTheInverse) {
+  Both both;
+  both.Fill(5);
+  ASSERT_TRUE(both.sparse.Factorise());
+  both.sparse.SetZero();
+  std::mt19937_64 rng(6);
+  both.sparse.g() = Random(both.sparse.num_columns(), 1, &rng);
+  const VectorXd x = both.sparse.SolveFactorised();
+  EXPECT_LT((x + both.H.llt().solve(both.sparse.g())).norm(), 1e-10 * x.norm());
+  const MatrixXd inverse = both.H.inverse();
+  for (size_t i = 0; i < kSizes.size(); ++i) {
+    const int column = both.sparse.ColumnOf(static_cast<int>(i));
+    const MatrixXd block = inverse.block(column, column, kSizes[i], kSizes[i]);
+    EXPECT_LT((both.sparse.InverseBlock(static_cast<int>(i)) - block).norm(), 1e-10 * block.norm());
   }
 }
 

@@ -7,7 +7,7 @@
 namespace pangea {
 namespace {
 
-// Ceres links OpenMP; CHOLMOD's code requests four threads in this way.
+// CHOLMOD links OpenMP, and its code requests four threads in this way.
 TEST(Process, SolvesInOneThreadWhateverALibraryAsksFor) {
   using Region = void (*)(void*);
   void* const symbol = dlsym(RTLD_DEFAULT, "GOMP_parallel");

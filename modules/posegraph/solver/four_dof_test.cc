@@ -34,72 +34,25 @@ Pose4 RandomPose(Random& random) { return {NormalVector(random, 5), Normal(rando
 
 Eigen::Quaterniond RandomAttitude(Random& random) { return ExpSo3(NormalVector(random, 1.5)); }
 
-TEST(RelativePoseCost, JacobiansAgreeWithDifferences) {
-  Random random(1);
-  for (int trial = 0; trial < 200; ++trial) {
-    Relative4 measured{NormalVector(random, 3), Normal(random, 1), {}};
-    measured.covariance = RandomCovariance<4>(random, 0.3);
-    const double weight = 0.7;
-    const RelativePoseCost cost(measured, Whitening(measured.covariance), &weight);
-    Vector4d x[2];
-    for (Vector4d& v : x) {
-      const Pose4 pose = RandomPose(random);
-      v << pose.p, pose.yaw;
-    }
-    using RowMajor = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;
-    RowMajor J[2];
-    Vector4d r;
-    double* jacobians[2] = {J[0].data(), J[1].data()};
-    const double* parameters[2] = {x[0].data(), x[1].data()};
-    ASSERT_TRUE(cost.Evaluate(parameters, r.data(), jacobians));
-    for (int block = 0; block < 2; ++block) {
-      for (int i = 0; i < 4; ++i) {
-        constexpr double kStep = 1e-6;
-        Vector4d plus, minus;
-        const double before = x[block][i];
-        x[block][i] = before + kStep;
-        cost.Evaluate(parameters, plus.data(), nullptr);
-        x[block][i] = before - kStep;
-        cost.Evaluate(parameters, minus.data(), nullptr);
-        x[block][i] = before;
-        const Vector4d numeric = (plus - minus) / (2 * kStep);
-        // Central differences of a function of curvature ~1 with |J| up to ~100.
-        EXPECT_LT((J[block].col(i) - numeric).norm(), 1e-6 * (1 + numeric.norm())) << trial;
-      }
-    }
-  }
-}
-
-TEST(ScaledPoseCost, JacobiansAgreeWithDifferences) {
+TEST(PoseCost, JacobiansAgreeWithDifferences) {
   Random random(5);
   for (int trial = 0; trial < 200; ++trial) {
     Relative4 measured{NormalVector(random, 3), Normal(random, 1), {}};
     measured.covariance = RandomCovariance<4>(random, 0.3);
-    const double weight = 0.7;
-    const ScaledPoseCost cost(measured, Whitening(measured.covariance), &weight);
+    const PoseCost cost(measured);
     const Pose4 from = RandomPose(random), to = RandomPose(random);
-    const double log_scale = Normal(random, 0.3);
-    using RowMajor = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;
-    RowMajor J[2];
-    Vector4d J_scale;
-    const auto evaluate = [&](const Eigen::VectorXd& offset, double** jacobians) {
-      Vector4d x[2];
-      x[0] << from.p, from.yaw;
-      x[1] << to.p, to.yaw;
-      x[0] += offset.head<4>();
-      x[1] += offset.segment<4>(4);
-      const double kappa = log_scale + offset[8];
-      const double* parameters[3] = {x[0].data(), x[1].data(), &kappa};
-      Eigen::VectorXd r(4);
-      EXPECT_TRUE(cost.Evaluate(parameters, r.data(), jacobians));
-      return r;
-    };
-    double* jacobians[3] = {J[0].data(), J[1].data(), J_scale.data()};
-    evaluate(Eigen::VectorXd::Zero(9), jacobians);
+    const double log_scale = trial % 2 == 0 ? 0 : Normal(random, 0.3);
+    PoseCost::Jacobians J;
+    const Vector4d r = cost.Linearise(from, to, log_scale, &J);
+    EXPECT_EQ(r, cost.Residual(from, to, log_scale));
     Eigen::Matrix<double, 4, 9> analytic;
-    analytic << J[0], J[1], J_scale;
-    const Eigen::MatrixXd numeric = NumericJacobian(
-        9, 1e-6, [&](const Eigen::VectorXd& offset) { return evaluate(offset, nullptr); });
+    analytic << J.from, J.to, J.log_scale;
+    const Eigen::MatrixXd numeric =
+        NumericJacobian(9, 1e-6, [&](const Eigen::VectorXd& offset) -> Eigen::VectorXd {
+          return cost.Residual({from.p + offset.head<3>(), from.yaw + offset[3]},
+                               {to.p + offset.segment<3>(4), to.yaw + offset[7]},
+                               log_scale + offset[8]);
+        });
     EXPECT_LT((analytic - numeric).norm(), 1e-6 * (1 + numeric.norm())) << trial;
   }
 }

@@ -1,24 +1,25 @@
 #include "posegraph/solver/group_solver.h"
 
-#include <ceres/ceres.h>
-#include <ceres/normal_prior.h>
-
-#include <Eigen/Sparse>
-#include <Eigen/SparseCholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
-
-#include "posegraph/solver/pose_cost.h"
+#include <limits>
+#include <utility>
 
 namespace pangea {
 namespace {
 
-constexpr double kOne = 1;
 constexpr int kSwitchRounds = 5;
 constexpr int kMaxIterations = 30;  // of a solve
 // The control parameter of GNC grows by this factor in each step.
 constexpr double kGncFactor = 2.0;
 constexpr int kMaxGncSteps = 25;
+
+// A minimum is reached when a step would reduce the cost by no more than this.
+constexpr double kTolerance = 1e-9;  // of the cost
+constexpr double kLeastDecrease = 1e-14;
+// Shares of the diagonal: the least only holds what no loop in force connects to a fixed node.
+constexpr double kLeastDamping = 1e-12, kFirstDamping = 1e-6, kDampingFactor = 10;
 
 // Weight of a residual under the GNC surrogate with control parameter mu (RA-L 2020, eq. 14).
 double GraduatedWeight(double squared_residual, double c2, double mu) {
@@ -31,37 +32,6 @@ double GraduatedWeight(double squared_residual, double c2, double mu) {
   return std::clamp(std::sqrt(c2 / squared_residual * mu * (mu + 1)) - mu, 0.0, 1.0);
 }
 
-using SparseFactor = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>;
-
-// The 4x4 diagonal block at `column` of the inverse of P' L D L' P: it is Y' D^-1 Y with L Y = P e.
-// Few rows of Y are not zero: those on the paths of the elimination tree from the four columns to
-// the root (Davis, Direct Methods for Sparse Linear Systems, 2006, section 3.2). The four paths
-// meet, so these rows lie on one path. A column's parent is its first row below the diagonal.
-Matrix4d InverseBlock(const SparseFactor& factor, const Eigen::VectorXd& D, int column) {
-  const Eigen::SparseMatrix<double>& L = factor.matrixL().nestedExpression();
-  const int size = static_cast<int>(L.cols());
-  Eigen::Matrix4Xd Y = Eigen::Matrix4Xd::Zero(4, size);  // transposed
-  int j = size;
-  for (int k = 0; k < 4; ++k) {
-    const int row = factor.permutationP().indices()[column + k];
-    Y(k, row) = 1;
-    j = std::min(j, row);
-  }
-  Matrix4d block = Matrix4d::Zero();
-  while (j < size) {
-    const Vector4d y = Y.col(j);
-    block += y * y.transpose() / D[j];
-    int parent = size;
-    for (Eigen::SparseMatrix<double>::InnerIterator entry(L, j); entry; ++entry) {
-      const int row = static_cast<int>(entry.row());
-      Y.col(row) -= entry.value() * y;
-      parent = std::min(parent, row);
-    }
-    j = parent;
-  }
-  return block;
-}
-
 // Sigmas of a node that no loop in force connects to a fixed one (m, m, m, rad).
 const Vector4d kUnknownSigmas(100, 100, 100, 3.2);
 
@@ -70,107 +40,188 @@ bool IsKnown(const Matrix4d& covariance) {
          (covariance.diagonal().array() <= kUnknownSigmas.array().square()).all();
 }
 
-// The blocks at these columns of the inverse of H. False if H is singular, or nearly so.
-bool InverseBlocks(const Eigen::SparseMatrix<double>& H, const std::vector<int>& columns,
-                   std::vector<Matrix4d>* blocks) {
-  const SparseFactor factor(H);
-  if (factor.info() != Eigen::Success) {
-    return false;
-  }
-  const Eigen::VectorXd D = factor.vectorD();
-  bool known = true;
-  for (size_t i = 0; i < columns.size(); ++i) {
-    if (columns[i] >= 0) {
-      (*blocks)[i] = InverseBlock(factor, D, columns[i]);
-      known = known && IsKnown((*blocks)[i]);
-    }
-  }
-  return known;
-}
-
-// H with a prior of kUnknownSigmas on each of the first `num_nodes` blocks of four columns.
-Eigen::SparseMatrix<double> WithPriors(Eigen::SparseMatrix<double> H, int num_nodes) {
-  for (int i = 0; i < 4 * num_nodes; ++i) {
-    H.coeffRef(i, i) += 1 / (kUnknownSigmas[i % 4] * kUnknownSigmas[i % 4]);
-  }
-  return H;
-}
-
 }  // namespace
 
-GroupSolver::GroupSolver() : problem_(std::make_unique<ceres::Problem>()) {}
-
-GroupSolver::~GroupSolver() = default;
-
 int GroupSolver::AddNode(const Pose4& pose, bool fixed) {
-  nodes_.push_back({pose.p.x(), pose.p.y(), pose.p.z(), pose.yaw});
+  state_.poses.push_back(pose);
   fixed_.push_back(fixed);
-  problem_->AddParameterBlock(nodes_.back().data(), 4);
-  if (fixed) {
-    problem_->SetParameterBlockConstant(nodes_.back().data());
-  }
-  return static_cast<int>(nodes_.size()) - 1;
+  return static_cast<int>(fixed_.size()) - 1;
 }
 
 int GroupSolver::AddScale(double log_scale, double sigma) {
-  scales_.push_back(log_scale);
-  problem_->AddResidualBlock(
-      new ceres::NormalPrior(ceres::Matrix::Constant(1, 1, 1 / sigma), ceres::Vector::Zero(1)),
-      nullptr, &scales_.back());
-  return static_cast<int>(scales_.size()) - 1;
+  state_.log_scales.push_back(log_scale);
+  scale_sigmas_.push_back(sigma);
+  return static_cast<int>(scale_sigmas_.size()) - 1;
 }
 
-void GroupSolver::AddEdge(int from, int to, int scale, const Relative4& relative,
-                          const Matrix4d& whitening, const double* sqrt_weight) {
-  if (scale == kMetric) {
-    problem_->AddResidualBlock(new RelativePoseCost(relative, whitening, sqrt_weight), nullptr,
-                               nodes_[from].data(), nodes_[to].data());
-  } else {
-    problem_->AddResidualBlock(new ScaledPoseCost(relative, whitening, sqrt_weight), nullptr,
-                               nodes_[from].data(), nodes_[to].data(), &scales_[scale]);
-  }
+int GroupSolver::AddEdge(const Edge& edge) {
+  edges_.push_back(edge);
+  return static_cast<int>(edges_.size()) - 1;
 }
 
 void GroupSolver::AddOdometry(int from, int to, const Relative4& relative, int scale) {
-  AddEdge(from, to, scale, relative, Whitening(relative.covariance), &kOne);
+  AddEdge({from, to, scale, PoseCost(relative)});
 }
 
 int GroupSolver::AddLoop(int from, int to, const Relative4& relative, bool on, int scale) {
-  loops_.push_back({from, to, scale, relative, Whitening(relative.covariance)});
-  Loop& loop = loops_.back();
-  SetWeight(&loop, on ? 1 : 0);
-  AddEdge(from, to, scale, relative, loop.whitening, &loop.sqrt_weight);
+  loops_.push_back(AddEdge({from, to, scale, PoseCost(relative), on ? 1.0 : 0.0}));
   return static_cast<int>(loops_.size()) - 1;
 }
 
-Pose4 GroupSolver::pose(int node) const {
-  return {Eigen::Vector3d::Map(nodes_[node].data()), nodes_[node][3]};
+void GroupSolver::Begin() {
+  std::vector<int> sizes;
+  for (const bool fixed : fixed_) {
+    variable_.push_back(fixed ? kFixed : static_cast<int>(sizes.size()));
+    if (!fixed) {
+      sizes.push_back(4);
+    }
+  }
+  const auto first_scale = static_cast<int>(sizes.size());
+  sizes.resize(sizes.size() + scale_sigmas_.size(), 1);
+  std::vector<std::vector<int>> cliques;
+  for (const Edge& edge : edges_) {
+    std::vector<int>& clique = cliques.emplace_back();
+    const auto [first, second] = std::minmax(edge.from, edge.to);
+    for (const int node : {first, second}) {
+      if (variable_[node] != kFixed) {
+        clique.push_back(variable_[node]);
+      }
+    }
+    if (edge.scale != kMetric) {
+      clique.push_back(first_scale + edge.scale);
+    }
+  }
+  for (int variable = 0; variable < static_cast<int>(sizes.size()); ++variable) {
+    cliques.push_back({variable});
+  }
+  equations_ = std::make_unique<BlockEquations>(sizes, cliques);
 }
 
-void GroupSolver::SetWeight(Loop* loop, double weight) {
-  loop->weight = weight;
-  loop->sqrt_weight = std::sqrt(weight);
+double GroupSolver::SquaredResidual(const Edge& edge, const State& state) const {
+  const double log_scale = edge.scale == kMetric ? 0 : state.log_scales[edge.scale];
+  return edge.cost.Residual(state.poses[edge.from], state.poses[edge.to], log_scale).squaredNorm();
 }
 
-double GroupSolver::SquaredResidual(const Loop& loop) const {
-  const double scale = loop.scale == kMetric ? 1 : std::exp(scales_[loop.scale]);
-  return (loop.whitening * Residual(pose(loop.from), pose(loop.to), loop.relative, scale))
-      .squaredNorm();
+double GroupSolver::CostOf(const State& state) const {
+  double squared = 0;
+  for (const Edge& edge : edges_) {
+    squared += edge.weight > 0 ? edge.weight * SquaredResidual(edge, state) : 0;
+  }
+  for (size_t i = 0; i < scale_sigmas_.size(); ++i) {
+    const double r = state.log_scales[i] / scale_sigmas_[i];
+    squared += r * r;
+  }
+  return 0.5 * squared;
 }
 
+void GroupSolver::AddToEquations(size_t index) const {
+  const Edge& edge = edges_[index];
+  const double log_scale = edge.scale == kMetric ? 0 : state_.log_scales[edge.scale];
+  PoseCost::Jacobians J;
+  const Vector4d r =
+      edge.cost.Linearise(state_.poses[edge.from], state_.poses[edge.to], log_scale, &J);
+  Eigen::VectorXd& g = equations_->g();
+  std::array<std::pair<int, const Matrix4d*>, 2> ends{{{edge.from, &J.from}, {edge.to, &J.to}}};
+  if (edge.from > edge.to) {
+    std::swap(ends[0], ends[1]);
+  }
+  std::array<const Matrix4d*, 2> free{};
+  size_t num_free = 0;
+  for (const auto& [node, J_node] : ends) {
+    if (variable_[node] == kFixed) {
+      continue;
+    }
+    const Matrix4d weighted = edge.weight * J_node->transpose();
+    g.segment<4>(equations_->ColumnOf(variable_[node])) += weighted * r;
+    free[num_free] = J_node;
+    for (size_t k = 0; k <= num_free; ++k) {
+      equations_->Add(index, num_free, k, weighted * *free[k]);
+    }
+    ++num_free;
+  }
+  if (edge.scale != kMetric) {
+    const Eigen::RowVector4d weighted = edge.weight * J.log_scale.transpose();
+    const auto num_scales = static_cast<int>(scale_sigmas_.size());
+    g[equations_->num_columns() - num_scales + edge.scale] += weighted * r;
+    for (size_t k = 0; k < num_free; ++k) {
+      equations_->Add(index, num_free, k, weighted * *free[k]);
+    }
+    equations_->Add(index, num_free, num_free, Eigen::Matrix<double, 1, 1>(weighted * J.log_scale));
+  }
+}
+
+void GroupSolver::Linearise() const {
+  equations_->SetZero();
+  for (size_t i = 0; i < edges_.size(); ++i) {
+    if (edges_[i].weight > 0) {
+      AddToEquations(i);
+    }
+  }
+  const size_t num_scales = scale_sigmas_.size();
+  const size_t first_clique = edges_.size() + std::ranges::count(fixed_, false);
+  for (size_t i = 0; i < num_scales; ++i) {
+    const double information = 1 / (scale_sigmas_[i] * scale_sigmas_[i]);
+    equations_->Add(first_clique + i, 0, 0, Eigen::Matrix<double, 1, 1>(information));
+    equations_->g()[equations_->num_columns() - num_scales + i] +=
+        information * state_.log_scales[i];
+  }
+}
+
+GroupSolver::State GroupSolver::MovedBy(const Eigen::VectorXd& step) const {
+  State moved = state_;
+  for (size_t node = 0; node < fixed_.size(); ++node) {
+    if (!fixed_[node]) {
+      const auto by = step.segment<4>(equations_->ColumnOf(variable_[node]));
+      moved.poses[node].p += by.head<3>();
+      moved.poses[node].yaw += by[3];
+    }
+  }
+  const size_t num_scales = scale_sigmas_.size();
+  for (size_t i = 0; i < num_scales; ++i) {
+    moved.log_scales[i] += step[equations_->num_columns() - num_scales + i];
+  }
+  return moved;
+}
+
+bool GroupSolver::Factorise(double damping) {
+  Linearise();
+  equations_->Damp(damping);
+  const bool factorised = equations_->Factorise();
+  factor_damping_ = factorised ? damping : kNoFactor;
+  return factorised;
+}
+
+// A factor serves for several steps: near the minimum the cost is nearly quadratic, and a step
+// takes a fraction of the time of a factor.
 void GroupSolver::Minimise(int max_iterations) {
-  ceres::Solver::Options options;
-  options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
-  options.sparse_linear_algebra_library_type = ceres::SUITE_SPARSE;
-  options.num_threads = 1;
-  options.max_num_iterations = max_iterations;
-  // Odometry and alignments give a good initial guess, so almost no damping is needed.
-  options.initial_trust_region_radius = 1e8;
-  options.function_tolerance = 1e-9;
-  options.parameter_tolerance = 1e-10;
-  options.logging_type = ceres::SILENT;
-  ceres::Solver::Summary summary;
-  ceres::Solve(options, problem_.get(), &summary);
+  constexpr double kMinContraction = 0.1;  // of the predicted decrease, from step to step
+  if (equations_ == nullptr) {
+    Begin();
+  }
+  double cost = CostOf(state_), damping = kLeastDamping;
+  for (int iteration = 0; iteration < max_iterations; ++iteration) {
+    bool factorised = Factorise(damping);
+    for (double last = std::numeric_limits<double>::infinity(); factorised; Linearise()) {
+      const Eigen::VectorXd step = equations_->SolveFactorised();
+      const double decrease = -0.5 * equations_->g().dot(step);
+      if (decrease <= kTolerance * cost + kLeastDecrease) {
+        return;
+      }
+      if (decrease > kMinContraction * last) {
+        break;
+      }
+      State moved = MovedBy(step);
+      const double moved_cost = CostOf(moved);
+      if (!(moved_cost < cost)) {
+        factorised = std::isfinite(last);
+        break;
+      }
+      state_ = std::move(moved);
+      cost = moved_cost;
+      last = decrease;
+    }
+    damping = factorised ? kLeastDamping : std::max(kFirstDamping, kDampingFactor * damping);
+  }
 }
 
 void GroupSolver::SolveGraduated() {
@@ -178,24 +229,25 @@ void GroupSolver::SolveGraduated() {
   const double c2 = kMaxLoopChi2;
   Minimise(kMaxIterations);
   double worst = 0;
-  for (const Loop& loop : loops_) {
-    worst = std::max(worst, loop.weight * SquaredResidual(loop));
+  for (const int loop : loops_) {
+    worst = std::max(worst, edges_[loop].weight * SquaredResidual(edges_[loop], state_));
   }
   if (worst > c2) {
     double mu = c2 / (2 * worst - c2);
     for (int step = 0; step < kMaxGncSteps; ++step, mu *= kGncFactor) {
       bool decided = true;
-      for (Loop& loop : loops_) {
-        SetWeight(&loop, GraduatedWeight(SquaredResidual(loop), c2, mu));
-        decided = decided && (loop.weight == 0 || loop.weight == 1);
+      for (const int loop : loops_) {
+        double& weight = edges_[loop].weight;
+        weight = GraduatedWeight(SquaredResidual(edges_[loop], state_), c2, mu);
+        decided = decided && (weight == 0 || weight == 1);
       }
       Minimise(kIterationsPerStep);
       if (decided && mu > 1) {
         break;
       }
     }
-    for (Loop& loop : loops_) {
-      SetWeight(&loop, loop.weight > 0.5 ? 1 : 0);
+    for (const int loop : loops_) {
+      edges_[loop].weight = edges_[loop].weight > 0.5 ? 1 : 0;
     }
     Minimise(kMaxIterations);
   }
@@ -211,11 +263,12 @@ void GroupSolver::SwitchUntilStable(const std::vector<bool>& may_go) {
   for (int round = 0; round < kSwitchRounds; ++round) {
     bool changed = false;
     for (size_t i = 0; i < loops_.size(); ++i) {
-      const bool fits = SquaredResidual(loops_[i]) <= kMaxLoopChi2;
+      Edge& loop = edges_[loops_[i]];
+      const bool fits = SquaredResidual(loop, state_) <= kMaxLoopChi2;
       const bool on = loop_on(static_cast<int>(i));
       // Only loops with may_go are switched off, and none in the last round: two may alternate.
       if (fits != on && (!on || (may_go[i] && round < kSwitchRounds - 1))) {
-        SetWeight(&loops_[i], fits ? 1 : 0);
+        loop.weight = fits ? 1 : 0;
         changed = true;
       }
     }
@@ -226,38 +279,35 @@ void GroupSolver::SwitchUntilStable(const std::vector<bool>& may_go) {
   }
 }
 
-std::vector<Matrix4d> GroupSolver::Marginals(const std::vector<int>& nodes) const {
-  std::vector<double*> blocks;
-  std::vector<int> column(nodes_.size(), -1);
-  for (size_t i = 0; i < nodes_.size(); ++i) {
-    if (!fixed_[i]) {
-      column[i] = static_cast<int>(4 * blocks.size());
-      blocks.push_back(const_cast<double*>(nodes_[i].data()));
+// False if a node is not known, or nearly so.
+bool GroupSolver::InverseBlocks(const std::vector<int>& nodes,
+                                std::vector<Matrix4d>* blocks) const {
+  bool known = true;
+  for (size_t i = 0; i < nodes.size(); ++i) {
+    if (!fixed_[nodes[i]]) {
+      (*blocks)[i] = equations_->InverseBlock(variable_[nodes[i]]);
+      known = known && IsKnown((*blocks)[i]);
     }
   }
+  return known;
+}
+
+std::vector<Matrix4d> GroupSolver::Marginals(const std::vector<int>& nodes) {
   std::vector<Matrix4d> marginals(nodes.size(), Matrix4d::Zero());
-  if (blocks.empty()) {
-    return marginals;
-  }
-  const auto num_nodes = static_cast<int>(blocks.size());
-  for (const double& scale : scales_) {
-    blocks.push_back(const_cast<double*>(&scale));
-  }
-  ceres::Problem::EvaluateOptions options;
-  options.parameter_blocks = blocks;
-  ceres::CRSMatrix crs;
-  problem_->Evaluate(options, nullptr, nullptr, nullptr, &crs);
-  const Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>> J(
-      crs.num_rows, crs.num_cols, static_cast<int>(crs.values.size()), crs.rows.data(),
-      crs.cols.data(), crs.values.data());
-  const Eigen::SparseMatrix<double> H = J.transpose() * J;
-  std::vector<int> columns;
-  for (const int node : nodes) {
-    columns.push_back(column[node]);
-  }
-  // Singular if all loops of a map are switched off.
-  if (!InverseBlocks(H, columns, &marginals)) {
-    InverseBlocks(WithPriors(H, num_nodes), columns, &marginals);
+  const bool has_factor = factor_damping_ == kLeastDamping || Factorise(kLeastDamping);
+  // Nearly singular if all loops of a map are switched off.
+  if (!has_factor || !InverseBlocks(nodes, &marginals)) {
+    Linearise();
+    const Matrix4d prior = kUnknownSigmas.cwiseAbs2().cwiseInverse().asDiagonal();
+    for (const int variable : variable_) {
+      if (variable != kFixed) {
+        equations_->Add(edges_.size() + variable, 0, 0, prior);
+      }
+    }
+    factor_damping_ = kNoFactor;
+    if (equations_->Factorise()) {
+      InverseBlocks(nodes, &marginals);
+    }
   }
   return marginals;
 }

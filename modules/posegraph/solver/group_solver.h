@@ -6,29 +6,21 @@
 //
 // by graduated non-convexity for truncated least squares (Yang et al., RA-L 2020), with weights
 // from covariances alone: c^2 is the 0.999 quantile of chi-squared with four degrees of freedom
-// (kMaxLoopChi2). Sparse Cholesky (SuiteSparse through Ceres), one thread: the same calls give the
-// same bytes.
+// (kMaxLoopChi2). Levenberg-Marquardt with sparse Cholesky (block_equations.h), one thread: the
+// same calls give the same bytes.
 
-#include <array>
-#include <deque>
+#include <limits>
 #include <memory>
 #include <vector>
 
+#include "block_equations/block_equations.h"
 #include "posegraph/solver/four_dof.h"
-
-namespace ceres {
-class Problem;
-}
+#include "posegraph/solver/pose_cost.h"
 
 namespace pangea {
 
 class GroupSolver {
  public:
-  GroupSolver();
-  ~GroupSolver();
-  GroupSolver(const GroupSolver&) = delete;
-  GroupSolver& operator=(const GroupSolver&) = delete;
-
   static constexpr int kMetric = -1;
 
   int AddNode(const Pose4& pose, bool fixed);
@@ -46,36 +38,49 @@ class GroupSolver {
   // that are off are switched on again if they fit.
   void SolveWarm(const std::vector<bool>& may_go);
 
-  Pose4 pose(int node) const;
-  bool loop_on(int loop) const { return loops_[loop].weight > 0.5; }
-  double log_scale(int scale) const { return scales_[scale]; }
+  const Pose4& pose(int node) const { return state_.poses[node]; }
+  bool loop_on(int loop) const { return edges_[loops_[loop]].weight > 0.5; }
+  double log_scale(int scale) const { return state_.log_scales[scale]; }
 
-  // Covariances of (p, yaw) of some nodes: 4x4 diagonal blocks of the inverse of J^T J, from one
-  // sparse factorisation; per node only the needed part of the triangular solve is done. Zero for a
-  // fixed node; sigmas of about 100 m and pi if no loop in force connects it to one.
-  std::vector<Matrix4d> Marginals(const std::vector<int>& nodes) const;
+  // Covariances of (p, yaw) of some nodes: 4x4 diagonal blocks of the inverse of J^T J, from the
+  // last factor of the solve. Zero for a fixed node; sigmas of about 100 m and pi if no loop in
+  // force connects it to one. Call after a solve.
+  std::vector<Matrix4d> Marginals(const std::vector<int>& nodes);
 
  private:
-  struct Loop {
-    int from = 0, to = 0, scale = kMetric;
-    Relative4 relative;
-    Matrix4d whitening;
-    double weight = 1;
-    double sqrt_weight = 1;  // the cost function reads it through a pointer
+  struct State {
+    std::vector<Pose4> poses;
+    std::vector<double> log_scales;
   };
+  struct Edge {
+    int from = 0, to = 0, scale = kMetric;
+    PoseCost cost;
+    double weight = 1;
+  };
+  static constexpr int kFixed = -1;
+  static constexpr double kNoFactor = std::numeric_limits<double>::infinity();
 
-  void AddEdge(int from, int to, int scale, const Relative4& relative, const Matrix4d& whitening,
-               const double* sqrt_weight);
+  int AddEdge(const Edge& edge);
+  void Begin();
   void Minimise(int max_iterations);
-  double SquaredResidual(const Loop& loop) const;
-  static void SetWeight(Loop* loop, double weight);
+  void Linearise() const;
+  bool Factorise(double damping);
+  void AddToEquations(size_t edge) const;
+  State MovedBy(const Eigen::VectorXd& step) const;
+  double CostOf(const State& state) const;
+  double SquaredResidual(const Edge& edge, const State& state) const;
   void SwitchUntilStable(const std::vector<bool>& may_go);
+  bool InverseBlocks(const std::vector<int>& nodes, std::vector<Matrix4d>* blocks) const;
 
-  std::deque<std::array<double, 4>> nodes_;
-  std::vector<bool> fixed_;
-  std::deque<double> scales_;
-  std::deque<Loop> loops_;
-  std::unique_ptr<ceres::Problem> problem_;
+  State state_;
+  std::vector<bool> fixed_;           // by node
+  std::vector<double> scale_sigmas_;  // by scale
+  std::vector<Edge> edges_;
+  std::vector<int> loops_;  // edges that are loops
+  // Variables of the equations: free nodes, then scales. Cliques: edges, then single variables.
+  std::vector<int> variable_;  // by node
+  std::unique_ptr<BlockEquations> equations_;
+  double factor_damping_ = kNoFactor;
 };
 
 }  // namespace pangea
