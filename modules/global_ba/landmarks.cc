@@ -35,49 +35,41 @@ struct Track {
 
 class Builder {
  public:
-  Builder(KeyframeStore* store, BaWorld* world) : store_(store), world_(world) {
+  Builder(KeyframeStore* store, BaWorld* world) : world_(world) {
     for (const BaKeyframe& keyframe : world->keyframes) {
       T_map_cam_.push_back(keyframe.state.T_map_body * world->cameras[keyframe.camera].T_body_cam);
+      seen_.push_back(See(store, keyframe.id));
     }
   }
 
   void AddTracks() {
     for (int i = 0; i < static_cast<int>(world_->keyframes.size()); ++i) {
-      const Seen seen = See(i);
-      if (seen.view == nullptr) {
-        continue;
-      }
-      const Keyframe& keyframe = seen.view->keyframe();
-      for (int corner = 0; corner < static_cast<int>(keyframe.corners.size()); ++corner) {
-        const int32_t id = keyframe.corners[corner].landmark_id;
-        if (id == kNoLandmark || !seen.view->has_ray(corner)) {
+      const std::vector<SeenCorner>& corners = seen_[i];
+      for (int corner = 0; corner < static_cast<int>(corners.size()); ++corner) {
+        const int32_t id = corners[corner].landmark_id;
+        if (id == kNoLandmark || !corners[corner].has_ray) {
           continue;
         }
-        const std::vector<BaObservation>& so_far = tracks_[TrackOf(seen, corner)].own;
+        const std::vector<BaObservation>& so_far = tracks_[TrackOf(i, corner)].own;
         // Of several corners of one landmark only the first is used.
         if (!so_far.empty() && so_far.back().keyframe == i) {
           continue;
         }
         if (so_far.size() == kMaxOfTrack) {
-          cuts_[{keyframe.id.map, id}].push_back(i);
+          cuts_[{MapOf(i), id}].push_back(i);
         }
-        tracks_[TrackOf(seen, corner)].own.push_back(Observe(seen, corner, kTrackSigma_px));
+        tracks_[TrackOf(i, corner)].own.push_back(Observe(i, corner, kTrackSigma_px));
       }
     }
   }
 
   void AddMatches(const MatchedKeyframes& match) {
-    const Seen seen_a = See(match.a);
-    const Seen seen_b = See(match.b);
-    if (seen_a.view == nullptr || seen_b.view == nullptr) {
-      return;
-    }
     for (const auto& [corner_a, corner_b] : match.corners) {
-      if (!seen_a.Shows(corner_a) || !seen_b.Shows(corner_b)) {
+      if (!Shows(match.a, corner_a) || !Shows(match.b, corner_b)) {
         continue;
       }
-      const TrackId a = TrackOf(seen_a, corner_a);
-      const TrackId b = TrackOf(seen_b, corner_b);
+      const TrackId a = TrackOf(match.a, corner_a);
+      const TrackId b = TrackOf(match.b, corner_b);
       const bool both = a.landmark_id != kNoLandmark && b.landmark_id != kNoLandmark;
       // However many keyframes match two tracks, this is a single match, right or wrong.
       if (both && (a == b || !met_.insert(std::minmax(a, b)).second)) {
@@ -86,8 +78,8 @@ class Builder {
       // Both landmarks are observed at each other's corner: the same measurement twice, so half
       // weight.
       const double share = both ? std::sqrt(0.5) : 1;
-      AddMatch(a, seen_b, corner_b, share);
-      AddMatch(b, seen_a, corner_a, share);
+      AddMatch(a, match.b, corner_b, share);
+      AddMatch(b, match.a, corner_a, share);
     }
   }
 
@@ -111,38 +103,61 @@ class Builder {
   }
 
  private:
-  // A keyframe of the world with its view; null if it cannot be read.
-  struct Seen {
-    int keyframe = 0;
-    std::shared_ptr<const KeyframeView> view;
-
-    const Corner& CornerAt(int corner) const { return view->keyframe().corners[corner]; }
-    bool Shows(int corner) const {
-      return corner < static_cast<int>(view->keyframe().corners.size()) && view->has_ray(corner);
-    }
+  // What a landmark needs of a keyframe's corner. Matches name the keyframes in any order, so the
+  // corners of all are kept: they are a quarter of a view.
+  struct SeenCorner {
+    int32_t landmark_id = kNoLandmark;
+    bool has_ray = false;
+    double match_sigma_px = 0;
+    Eigen::Vector2f ray;
+    Eigen::Matrix2f pixel_jacobian;
   };
-  Seen See(int keyframe) const { return {keyframe, store_->Find(world_->keyframes[keyframe].id)}; }
 
-  TrackId TrackOf(const Seen& seen, int corner) const {
-    TrackId track{seen.view->keyframe().id.map, seen.CornerAt(corner).landmark_id};
+  // Empty if the keyframe cannot be read.
+  static std::vector<SeenCorner> See(KeyframeStore* store, const KeyframeId& id) {
+    std::vector<SeenCorner> seen;
+    if (const auto view = store->Find(id)) {
+      for (const Corner& corner : view->keyframe().corners) {
+        const auto index = static_cast<int>(seen.size());
+        SeenCorner& here = seen.emplace_back();
+        here.landmark_id = corner.landmark_id;
+        here.has_ray = view->has_ray(index);
+        if (here.has_ray) {
+          here.match_sigma_px = CornerSigma(corner, kMatchSigma_px);
+          here.ray = view->ray(index).cast<float>();
+          here.pixel_jacobian = view->pixel_jacobian(index).cast<float>();
+        }
+      }
+    }
+    return seen;
+  }
+
+  const MapId& MapOf(int keyframe) const { return world_->keyframes[keyframe].id.map; }
+  bool Shows(int keyframe, int corner) const {
+    return corner < static_cast<int>(seen_[keyframe].size()) && seen_[keyframe][corner].has_ray;
+  }
+
+  TrackId TrackOf(int keyframe, int corner) const {
+    TrackId track{MapOf(keyframe), seen_[keyframe][corner].landmark_id};
     if (const auto cuts = cuts_.find({track.map, track.landmark_id}); cuts != cuts_.end()) {
-      const auto after = std::ranges::upper_bound(cuts->second, seen.keyframe);
+      const auto after = std::ranges::upper_bound(cuts->second, keyframe);
       track.part = static_cast<int>(after - cuts->second.begin());
     }
     return track;
   }
 
-  static BaObservation Observe(const Seen& seen, int corner, double sigma) {
-    return {seen.keyframe, -1, seen.view->ray(corner), seen.view->pixel_jacobian(corner) / sigma};
+  BaObservation Observe(int keyframe, int corner, double sigma) const {
+    const SeenCorner& seen = seen_[keyframe][corner];
+    return {keyframe, -1, seen.ray.cast<double>(), seen.pixel_jacobian.cast<double>() / sigma};
   }
 
-  void AddMatch(const TrackId& track, const Seen& seen, int corner, double share) {
+  void AddMatch(const TrackId& track, int keyframe, int corner, double share) {
     const auto known = tracks_.find(track);
     // If several keyframes of one track match the same corner, it is one measurement.
     if (track.landmark_id != kNoLandmark && known != tracks_.end() &&
-        matched_.insert({track, seen.keyframe, corner}).second) {
-      const double sigma = CornerSigma(seen.CornerAt(corner), kMatchSigma_px);
-      known->second.matched.push_back(Observe(seen, corner, sigma / share));
+        matched_.insert({track, keyframe, corner}).second) {
+      const double sigma = seen_[keyframe][corner].match_sigma_px;
+      known->second.matched.push_back(Observe(keyframe, corner, sigma / share));
     }
   }
 
@@ -171,9 +186,9 @@ class Builder {
            (seen.sqrt_info * (p_cam.hnormalized() - seen.ray)).norm() < kMaxStartSigmas;
   }
 
-  KeyframeStore* store_;
   BaWorld* world_;
-  std::vector<Rigid3> T_map_cam_;
+  std::vector<Rigid3> T_map_cam_;              // by keyframe
+  std::vector<std::vector<SeenCorner>> seen_;  // by keyframe
   std::map<TrackId, Track> tracks_;
   // By map and landmark_id, of long tracks: the keyframes at which new parts begin, ascending.
   std::map<std::pair<MapId, int32_t>, std::vector<int>> cuts_;
