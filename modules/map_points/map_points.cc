@@ -84,12 +84,17 @@ MapPoints::Source MapPoints::Look(const KeyframeView& view, const Rigid3& T_map_
 }
 
 std::vector<KeyframeId> MapPoints::Near(const AgentPose& agent, const PosedGroup& group,
-                                        const Outlook& outlook) const {
+                                        const Outlook& outlook) {
+  const Vector3d axis = outlook.T_map_cam.q * Vector3d::UnitZ();
   std::vector<std::pair<double, KeyframeId>> near;
   for (const auto& [id, T_map_body] : group.T_map_body) {
     const bool is_recent = id.map == agent.map && id.seq > outlook.newest_seq - kOwnRecent;
     const double distance_m = (T_map_body.t - outlook.T_map_cam.t).norm();
-    if (!is_recent && distance_m <= kMaxDistance_m && refined_.contains(id)) {
+    if (is_recent || distance_m > kMaxDistance_m || !refined_.contains(id)) {
+      continue;
+    }
+    const Vector3d* const axis_body = CameraAxisOf(id);
+    if (axis_body != nullptr && axis.dot(T_map_body.q * *axis_body) >= std::cos(kMaxAxes_rad)) {
       near.emplace_back(distance_m, id);
     }
   }
@@ -105,11 +110,24 @@ std::vector<KeyframeId> MapPoints::Near(const AgentPose& agent, const PosedGroup
   return ids;
 }
 
+// One axis serves for a map: its extrinsics change by far less than kMaxAxes_rad.
+const Vector3d* MapPoints::CameraAxisOf(const KeyframeId& id) {
+  auto known = camera_axes_.find(id.map);
+  if (known == camera_axes_.end()) {
+    const auto view = store_.Find(id);
+    if (view == nullptr) {
+      return nullptr;
+    }
+    const Rigid3& T_body_cam = view->keyframe().camera.T_body_cam;
+    known = camera_axes_.emplace(id.map, T_body_cam.q * Vector3d::UnitZ()).first;
+  }
+  return &known->second;
+}
+
 // Sorted by the number of points in view, largest first.
 std::vector<MapPoints::Source> MapPoints::SourcesFor(const AgentPose& agent,
                                                      const PosedGroup& group,
                                                      const Outlook& outlook) {
-  const Vector3d axis = outlook.T_map_cam.q * Vector3d::UnitZ();
   std::vector<Source> sources;
   for (const KeyframeId& id : Near(agent, group, outlook)) {
     const auto view = store_.Find(id);
@@ -117,9 +135,6 @@ std::vector<MapPoints::Source> MapPoints::SourcesFor(const AgentPose& agent,
       continue;
     }
     const Rigid3 T_map_cam = group.T_map_body.at(id) * view->keyframe().camera.T_body_cam;
-    if (axis.dot(T_map_cam.q * Vector3d::UnitZ()) < std::cos(kMaxAxes_rad)) {
-      continue;
-    }
     Source source = Look(*view, T_map_cam, outlook);
     if (source.points.size() >= kMinPoints) {
       sources.push_back(std::move(source));

@@ -95,10 +95,12 @@ class MapPoints {
   class Selection;
 
   std::optional<Outlook> OutlookOf(const AgentPose& agent, const PosedGroup& group);
-  // The adjusted keyframes around the agent that are not recent ones of its own map, ascending. At
-  // most a bounded number, the nearest: each has to be read and projected.
+  // The adjusted keyframes around the agent that look where it does and are not recent ones of its
+  // own map, ascending. At most a bounded number, the nearest: each has to be read and projected.
   std::vector<KeyframeId> Near(const AgentPose& agent, const PosedGroup& group,
-                               const Outlook& outlook) const;
+                               const Outlook& outlook);
+  // In the body frame; null if it is not known.
+  const Eigen::Vector3d* CameraAxisOf(const KeyframeId& id);
   std::vector<Source> SourcesFor(const AgentPose& agent, const PosedGroup& group,
                                  const Outlook& outlook);
   Source Look(const KeyframeView& view, const Rigid3& T_map_cam, const Outlook& outlook) const;
@@ -107,6 +109,7 @@ class MapPoints {
   GroupStates<PosedGroup> groups_;
   std::set<KeyframeId> refined_;
   std::map<MapId, SentPoints> sent_points_;
+  std::map<MapId, Eigen::Vector3d> camera_axes_;
 };
 
 }  // namespace pangea
