@@ -34,6 +34,9 @@ std::vector<std::pair<int, int>> CornersFromRecord(const std::vector<uint8_t>& r
 }
 
 constexpr size_t kMinKeyframes = 10;  // smallest group that is adjusted
+// Largest group that is adjusted as a whole because it has grown. In one hall, where all keyframes
+// share landmarks, the time for the whole grows with the third power.
+constexpr size_t kMaxGrown = 250;
 // A whole adjustment that moved keyframes by more than this (root mean square) is repeated from its
 // result: its set of landmarks depends on the initial poses, and so, without the repetition, the
 // result would depend on earlier adjustments.
@@ -202,9 +205,11 @@ bool GlobalBa::IsLocal(const MapState& state, const MapPoses& poses) const {
     return false;
   }
   const auto& [basis, refined, adjusted, whole_keyframes, whole_is_due] = known->second;
-  const auto count = static_cast<double>(state.keyframes.size());
-  return count > options_.local.keyframes && !whole_is_due &&
-         count < options_.local.whole_growth * static_cast<double>(whole_keyframes) &&
+  const size_t count = state.keyframes.size();
+  const bool has_grown =
+      count <= kMaxGrown && static_cast<double>(count) >=
+                                options_.local.whole_growth * static_cast<double>(whole_keyframes);
+  return count > static_cast<size_t>(options_.local.keyframes) && !whole_is_due && !has_grown &&
          adjusted.IsShapeOf(poses);
 }
 

@@ -12,12 +12,13 @@
 // A group is due if its loops or keyframes differ from those of its last refinement, or if the pose
 // graph has lost that refinement (it was restarted). A large group is adjusted only near new
 // keyframes and matches (local_part.h); the rest is fixed at the last refinement. It is adjusted as
-// a whole if it has no refinement, if it has grown by half since its last whole adjustment (as
-// after a fusion of two groups), or if a local adjustment has moved adjusted keyframes by more than
-// max_shift_m. In all cases the refinement contains the whole group. A state is adjusted once: the
-// pose graph takes a second refinement of the same revision for a repeat. The work is done in
-// pieces, and abandoned when a message about its maps arrives. Map frame: that of the state. One
-// thread, no clock: the same calls in the same order give the same bytes.
+// a whole if it has no refinement, if a local adjustment has moved adjusted keyframes by more than
+// max_shift_m, or if it has doubled since its last whole adjustment (as after a fusion of two
+// groups) and has at most 250 keyframes. In all cases the refinement contains the whole group. A
+// state is adjusted once: the pose graph takes a second refinement of the same revision for a
+// repeat. The work is done in pieces, and abandoned when a message about its maps arrives. Map
+// frame: that of the state. One thread, no clock: the same calls in the same order give the same
+// bytes.
 
 #include <cstdint>
 #include <map>

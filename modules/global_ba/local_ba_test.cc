@@ -17,9 +17,9 @@ using Choice = std::function<bool(const KeyframeId&)>;
 
 // Three agents along a corridor whose end has no view of its start.
 constexpr int kKeyframes = 40, kNew = 12;
-BaTestWorld Corridor(double step_s = 0.5) {
+BaTestWorld Corridor(double step_s = 0.5, int keyframes = kKeyframes) {
   return MakeBaTestWorld({.agents = 3,
-                          .keyframes = kKeyframes,
+                          .keyframes = keyframes,
                           .step_s = step_s,
                           .landmarks = 400,
                           .drift_m_s = 1,
@@ -251,6 +251,15 @@ TEST(LocalBa, AGroupThatHasGrownIsAdjustedAsAWhole) {
   server.FinishBoth(Messages());
   EXPECT_EQ(server.counters().finished, 2);
   EXPECT_EQ(server.counters().finished_local, 0);
+}
+
+TEST(LocalBa, AVeryLargeGroupThatHasGrownIsAdjustedInPart) {
+  LocalOptions options = kLocal;
+  options.whole_growth = 1;
+  Server server(options);
+  server.FinishBoth(MessagesOf(Corridor(0.1, 130)));
+  EXPECT_EQ(server.counters().finished, 2);
+  EXPECT_EQ(server.counters().finished_local, 1);
 }
 
 // Two groups that were adjusted separately.

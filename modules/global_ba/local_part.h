@@ -16,9 +16,9 @@
 namespace pangea {
 
 struct LocalOptions {
-  int keyframes = 500;        // a group with more keyframes is adjusted in part
+  int keyframes = 150;        // a group with more keyframes is adjusted in part
   int max_neighbours = 100;   // moving keyframes in addition to new ones
-  double whole_growth = 1.5;  // relative size, since the last whole adjustment
+  double whole_growth = 2;    // relative size, since the last whole adjustment
   double max_shift_m = 0.05;  // of keyframes adjusted before
 
   template <typename Archive>
@@ -28,7 +28,7 @@ struct LocalOptions {
     archive.Add("max_neighbours", &max_neighbours, {0, 1000000}, "keyframes",
                 "that move beside those that are new");
     archive.Add("whole_growth", &whole_growth, {1, 1000}, "",
-                "of a group since it was adjusted as a whole, at which it is again");
+                "of a group since it was adjusted as a whole, at which it is again, if small");
     archive.Add("max_shift_m", &max_shift_m, {0, 1000}, "m",
                 "of a keyframe that was adjusted before; beyond it the whole group is");
   }
