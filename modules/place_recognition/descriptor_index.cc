@@ -84,8 +84,8 @@ bool DescriptorIndex::Restore(ByteReader* reader) {
       tables_, [&](Table& table) { return table.postings.Restore(reader, num_corners_.size()); });
 }
 
-template <typename Visit>
-void DescriptorIndex::Probe(const std::vector<Corner>& corners, Visit visit) const {
+template <typename Accept, typename Visit>
+void DescriptorIndex::Probe(const std::vector<Corner>& corners, Accept accept, Visit visit) const {
   std::vector<uint32_t> words(kTables * corners.size());
   for (size_t i = 0; i < words.size(); ++i) {
     words[i] = tables_[i % kTables].Word(corners[i / kTables].descriptor);
@@ -110,10 +110,10 @@ void DescriptorIndex::Probe(const std::vector<Corner>& corners, Visit visit) con
       const size_t corner = at / kTables;
       const uint32_t signature = table.Signature(corners[corner].descriptor);
       // The corner's index selects the phase of the sample.
-      table.postings.Sample(words[at], lists[at], kMaxPostingsPerWord, corner,
-                            [&](int32_t keyframe, uint32_t posted) {
-                              visit(corner, keyframe, std::popcount(posted ^ signature));
-                            });
+      table.postings.Sample(
+          words[at], lists[at], kMaxPostingsPerWord, corner,
+          [&](uint32_t posted) { return accept(std::popcount(posted ^ signature)); },
+          [&](int32_t keyframe) { visit(corner, keyframe); });
     });
   }
 }
@@ -121,8 +121,9 @@ void DescriptorIndex::Probe(const std::vector<Corner>& corners, Visit visit) con
 std::vector<float> DescriptorIndex::Query(const std::vector<Corner>& corners) const {
   std::vector<std::vector<int32_t>> met(corners.size());
   std::vector<size_t> last_voter(size(), corners.size());
-  Probe(corners, [&](size_t corner, int32_t keyframe, int distance) {
-    if (last_voter[keyframe] != corner && distance <= kMaxSignatureDistance) {
+  const auto is_similar = [](int distance) { return distance <= kMaxSignatureDistance; };
+  Probe(corners, is_similar, [&](size_t corner, int32_t keyframe) {
+    if (last_voter[keyframe] != corner) {
       last_voter[keyframe] = corner;
       met[corner].push_back(keyframe);
     }
@@ -143,7 +144,8 @@ std::vector<float> DescriptorIndex::Query(const std::vector<Corner>& corners) co
 
 int64_t DescriptorIndex::CountPostings(const std::vector<Corner>& corners) const {
   int64_t count = 0;
-  Probe(corners, [&](size_t, int32_t, int) { ++count; });
+  const auto take_all = [](int) { return true; };
+  Probe(corners, take_all, [&](size_t, int32_t) { ++count; });
   return count;
 }
 

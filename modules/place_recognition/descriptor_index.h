@@ -69,10 +69,10 @@ class DescriptorIndex {
     uint32_t Word(const Descriptor& descriptor) const;
     uint32_t Signature(const Descriptor& descriptor) const;
   };
-  // Calls visit(corner, keyframe, distance of signatures) for each posting with the corner's word,
-  // corner by corner.
-  template <typename Visit>
-  void Probe(const std::vector<Corner>& corners, Visit visit) const;
+  // Calls visit(corner, keyframe) for each posting with the corner's word and accept(distance of
+  // the signatures), corner by corner.
+  template <typename Accept, typename Visit>
+  void Probe(const std::vector<Corner>& corners, Accept accept, Visit visit) const;
 
   std::array<Table, kTables> tables_;
   std::vector<int> num_corners_;  // by keyframe

@@ -1,6 +1,7 @@
 #include "place_recognition/posting_lists.h"
 
 #include <algorithm>
+#include <bit>
 #include <numeric>
 #include <span>
 #include <utility>
@@ -86,21 +87,21 @@ void PostingLists::Add(uint32_t word, int32_t keyframe, uint32_t signature) {
   newest = static_cast<uint32_t>(waiting_.size()) - 1;
 }
 
-size_t PostingLists::SkipZeros(size_t bit, size_t zeros) const {
-  if (zeros == 0) {
+size_t PostingLists::Skip(uint64_t flip, size_t bit, size_t ones) const {
+  if (ones == 0) {
     return bit;
   }
-  uint64_t found = ~high_[bit / 64] >> (bit % 64);
-  for (size_t here = std::popcount(found); here < zeros; here = std::popcount(found)) {
-    zeros -= here;
+  uint64_t found = (high_[bit / 64] ^ flip) >> (bit % 64);
+  for (size_t here = std::popcount(found); here < ones; here = std::popcount(found)) {
+    ones -= here;
     bit += 64 - bit % 64;
-    found = ~high_[bit / 64];
+    found = high_[bit / 64] ^ flip;
   }
-  // Bisect: the wanted zero is in the lower or the upper half of the remaining bits.
+  // Bisect: the wanted one is in the lower or the upper half of the remaining bits.
   for (int half = 32; half > 0; half /= 2) {
     const size_t lower = std::popcount(found & ((uint64_t{1} << half) - 1));
-    if (lower < zeros) {
-      zeros -= lower;
+    if (lower < ones) {
+      ones -= lower;
       found >>= half;
       bit += half;
     }

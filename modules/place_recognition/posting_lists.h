@@ -13,7 +13,6 @@
 //
 // Deterministic; the postings visited do not depend on when Pack is called. Not thread safe.
 
-#include <bit>
 #include <cstdint>
 #include <deque>
 #include <span>
@@ -65,25 +64,30 @@ class PostingLists {
     }
   }
 
-  // Calls visit(keyframe, signature), in any order, for the word's postings. If there are more than
-  // `most`, only for an evenly spaced sample of about `most`; `phase` selects which. `list`: the
-  // result of Find for this word.
-  template <typename Visit>
-  void Sample(uint32_t word, const PackedList& list, size_t most, size_t phase, Visit visit) const {
+  // Calls visit(keyframe), in any order, for the word's postings with accept(signature). If the
+  // word has more than `most`, considers only an evenly spaced sample of about `most`; `phase`
+  // selects which. `list`: the result of Find for this word. Fast if few are accepted: only of
+  // these it finds the keyframe.
+  template <typename Accept, typename Visit>
+  void Sample(uint32_t word, const PackedList& list, size_t most, size_t phase, Accept accept,
+              Visit visit) const {
     const size_t count = list.count + CountWaiting(word);
     const size_t stride = 1 + count / most;
-    size_t next = phase % stride;
-    ForEach(list, [&](size_t i, int32_t keyframe, uint32_t signature) {
-      if (i == next) {
-        visit(keyframe, signature);
-        next += stride;
+    size_t bit = list.bit, ones = 0;  // of the list, before `bit`
+    for (size_t i = phase % stride; i < list.count; i += stride) {
+      const size_t posting = list.first + i;
+      if (accept(signatures_[posting])) {
+        bit = SkipOnes(bit, i + 1 - ones);
+        ones = i + 1;
+        const size_t span = bit - list.bit - ones;
+        visit(static_cast<int32_t>(span << kLowBits | low_[posting]));
       }
-    });
+    }
     // Waiting postings come from the last to the first.
     size_t position = count;
     ForEachWaiting(word, [&](const Waiting& posting) {
-      if (--position % stride == phase % stride) {
-        visit(static_cast<int32_t>(posting.keyframe), posting.signature);
+      if (--position % stride == phase % stride && accept(posting.signature)) {
+        visit(static_cast<int32_t>(posting.keyframe));
       }
     });
   }
@@ -115,31 +119,14 @@ class PostingLists {
   size_t BlockBit(size_t block) const {
     return begin_[block] + (block << block_shift_) * num_spans_;
   }
-  // Position of the first 1 bit at or after `bit`.
-  size_t NextOne(size_t bit) const {
-    uint64_t rest = high_[bit / 64] >> (bit % 64);
-    while (rest == 0) {
-      bit += 64 - bit % 64;
-      rest = high_[bit / 64];
-    }
-    return bit + std::countr_zero(rest);
-  }
-  // Position after `zeros` 0 bits, counted from `bit` on.
-  size_t SkipZeros(size_t bit, size_t zeros) const;
+  // Position after so many 0 bits or 1 bits, counted from `bit` on.
+  size_t SkipZeros(size_t bit, size_t zeros) const { return Skip(~uint64_t{0}, bit, zeros); }
+  size_t SkipOnes(size_t bit, size_t ones) const { return Skip(0, bit, ones); }
+  // Position after so many 1 bits of the string with each limb XOR `flip`.
+  size_t Skip(uint64_t flip, size_t bit, size_t ones) const;
   // The list of the word whose bits begin at `bit`.
   PackedList ListAt(size_t bit, uint32_t word) const;
 
-  // Calls visit(i, keyframe, signature) with i = 0, 1, ...
-  template <typename Visit>
-  void ForEach(const PackedList& list, Visit visit) const {
-    size_t bit = list.bit;
-    for (size_t i = 0; i < list.count; ++i, ++bit) {
-      bit = NextOne(bit);
-      const size_t span = bit - list.bit - i;
-      const size_t posting = list.first + i;
-      visit(i, static_cast<int32_t>(span << kLowBits | low_[posting]), signatures_[posting]);
-    }
-  }
   // Calls visit(waiting) for the word's waiting postings, the newest first.
   template <typename Visit>
   void ForEachWaiting(uint32_t word, Visit visit) const {

@@ -12,21 +12,29 @@ namespace {
 
 using Postings = std::vector<std::pair<int32_t, uint32_t>>;
 
-Postings Visited(const PostingLists& lists, uint32_t word, size_t most, size_t phase) {
+// One signature in `of` is accepted.
+Postings Visited(const PostingLists& lists, uint32_t word, size_t most, size_t phase, uint32_t of) {
   Postings visited;
-  lists.Sample(word, lists.Find(word), most, phase, [&](int32_t keyframe, uint32_t signature) {
-    visited.emplace_back(keyframe, signature);
-  });
+  uint32_t accepted = 0;
+  lists.Sample(
+      word, lists.Find(word), most, phase,
+      [&](uint32_t signature) {
+        accepted = signature;
+        return signature % of == 0;
+      },
+      [&](int32_t keyframe) { visited.emplace_back(keyframe, accepted); });
   std::ranges::sort(visited);
   return visited;
 }
 
 // The expected result, from plain lists.
-Postings Expected(const Postings& list, size_t most, size_t phase) {
+Postings Expected(const Postings& list, size_t most, size_t phase, uint32_t of) {
   Postings expected;
   const size_t stride = 1 + list.size() / most;
   for (size_t i = phase % stride; i < list.size(); i += stride) {
-    expected.push_back(list[i]);
+    if (list[i].second % of == 0) {
+      expected.push_back(list[i]);
+    }
   }
   std::ranges::sort(expected);
   return expected;
@@ -53,7 +61,9 @@ TEST(PostingLists, VisitsWhatPlainListsWouldWheneverItIsPacked) {
       }
       for (uint32_t word = 0; word < kWords; ++word) {
         for (const size_t most : {1000, 10, 3}) {
-          ASSERT_EQ(Visited(lists, word, most, n), Expected(plain[word], most, n));
+          for (const uint32_t of : {1, 5}) {
+            ASSERT_EQ(Visited(lists, word, most, n, of), Expected(plain[word], most, n, of));
+          }
         }
       }
     }
