@@ -12,7 +12,7 @@
 // docs/decisions/place_recognition_index.md.
 //
 // Deterministic; no result depends on time. Memory: 19.5 kB per keyframe of 600 corners, plus about
-// 4 MB (posting_lists.h).
+// 5 MB (posting_lists.h).
 
 #include <array>
 #include <cstdint>
@@ -56,7 +56,7 @@ class DescriptorIndex {
   // After every kPackEvery keyframes, the next table in turn is considered. It is packed if at
   // least one posting per kWordsAPosting words waits, and at least 1 / kPackShare of the packed
   // ones, so that the total work is not quadratic in the number of keyframes. More should not wait:
-  // waiting postings are scattered in memory.
+  // waiting postings take more memory.
   static constexpr int kPackEvery = 10;
   static constexpr size_t kWordsAPosting = 8;
   static constexpr size_t kPackShare = 64;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <iterator>
 #include <numeric>
 #include <span>
 #include <utility>
@@ -62,8 +63,7 @@ PostingLists::PostingLists(size_t num_words, size_t num_spans, size_t num_postin
   signatures_.resize(num_postings);
   block_shift_ = BlockShift();
   begin_.resize(NumBlocks());
-  newest_.resize(begin_.size(), kNone);
-  waits_.resize(num_words);
+  waiting_.resize(begin_.size());
 }
 
 int PostingLists::BlockShift() const {
@@ -76,15 +76,29 @@ int PostingLists::BlockShift() const {
 }
 
 void PostingLists::Add(uint32_t word, int32_t keyframe, uint32_t signature) {
-  uint32_t& newest = newest_[BlockOf(word)];
-  waits_[word] = true;
-  Waiting waiting;
-  waiting.keyframe = static_cast<uint32_t>(keyframe);
-  waiting.word_in_block = InBlock(word) & 0xf;
-  waiting.signature = signature;
-  waiting.older = newest;
-  waiting_.push_back(waiting);
-  newest = static_cast<uint32_t>(waiting_.size()) - 1;
+  uint32_t& newest = waiting_[BlockOf(word)].newest;
+  Linked linked;
+  linked.posting.keyframe = static_cast<uint32_t>(keyframe);
+  linked.posting.word_in_block = InBlock(word) & 0xf;
+  linked.posting.signature = signature;
+  linked.older = newest;
+  newest = static_cast<uint32_t>(linked_.size());
+  linked_.push_back(linked);
+  if (linked_.size() >= num_words_ / kWordsALinked) {
+    Group();
+  }
+}
+
+void PostingLists::Group() {
+  // In place: from the last block to the first each group moves to its new place.
+  size_t to = num_waiting();
+  grouped_.resize(to);
+  for (size_t block = waiting_.size(); block-- > 0;) {
+    const auto group_end = static_cast<uint32_t>(to);
+    ForEachWaitingOfBlock(block, [&](const Waiting& posting) { grouped_[--to] = posting; });
+    waiting_[block] = {group_end, kNone};
+  }
+  linked_.clear();
 }
 
 size_t PostingLists::Skip(uint64_t flip, size_t bit, size_t ones) const {
@@ -129,38 +143,36 @@ void PostingLists::ListPacked(size_t block, std::vector<PackedList>* lists) cons
   }
 }
 
-void PostingLists::ListWaiting(size_t block, std::vector<WordAndNumber>* waiting) const {
-  waiting->clear();
-  for (uint32_t i = newest_[block]; i != kNone; i = waiting_[i].older) {
-    waiting->emplace_back((block << block_shift_) + waiting_[i].word_in_block, i);
-  }
-  std::ranges::sort(*waiting);
-}
-
 void PostingLists::Pack() {
-  if (waiting_.empty()) {
+  Group();
+  if (grouped_.empty()) {
     return;
   }
-  const size_t num_spans = (waiting_.back().keyframe >> kLowBits) + 1;
+  uint32_t newest = 0;
+  for (const Waiting& posting : grouped_) {
+    newest = std::max<uint32_t>(newest, posting.keyframe);
+  }
+  const size_t num_spans = (newest >> kLowBits) + 1;
   size_t end = num_packed() + num_waiting();
   Lengthen(NumLimbs(end + num_words_ * num_spans), &high_);
   Lengthen(end, &low_);
   Lengthen(end, &signatures_);
   std::vector<uint32_t> first(num_words_);  // of each word's postings
-  std::vector<WordAndNumber> waiting;
+  std::vector<Waiting> newer;
   std::vector<PackedList> lists;
   // In place: from the last word to the first each moves to its new place, which is not before its
   // old one.
   for (size_t block = begin_.size(); block-- > 0;) {
-    ListWaiting(block, &waiting);
+    const auto group = std::span(grouped_).subspan(GroupBegin(block),
+                                                   waiting_[block].group_end - GroupBegin(block));
     ListPacked(block, &lists);
     for (size_t i = lists.size(); i-- > 0;) {
       const size_t word = (block << block_shift_) + i;
-      const auto newer = std::ranges::find_if(
-          waiting, [word](const WordAndNumber& posting) { return posting.first == word; });
-      end -= lists[i].count + (waiting.end() - newer);
-      PackWord(lists[i], word, num_spans, end, {newer, waiting.end()});
-      waiting.erase(newer, waiting.end());
+      newer.clear();
+      std::ranges::copy_if(group, std::back_inserter(newer),
+                           [i](const Waiting& posting) { return posting.word_in_block == i; });
+      end -= lists[i].count + newer.size();
+      PackWord(lists[i], word, num_spans, end, newer);
       first[word] = static_cast<uint32_t>(end);
     }
   }
@@ -170,13 +182,12 @@ void PostingLists::Pack() {
   for (size_t block = 0; block < begin_.size(); ++block) {
     begin_[block] = first[block << block_shift_];
   }
-  newest_.assign(begin_.size(), kNone);
-  waits_.assign(num_words_, false);
-  waiting_.clear();
+  waiting_.assign(begin_.size(), {});
+  grouped_.clear();
 }
 
 void PostingLists::PackWord(const PackedList& list, size_t word, size_t num_spans, size_t first,
-                            std::span<const WordAndNumber> newer) {
+                            std::span<const Waiting> newer) {
   std::copy_backward(low_.begin() + list.first, low_.begin() + list.first + list.count,
                      low_.begin() + first + list.count);
   std::copy_backward(signatures_.begin() + list.first,
@@ -186,8 +197,7 @@ void PostingLists::PackWord(const PackedList& list, size_t word, size_t num_span
   const size_t moved = list.count + num_spans_;
   MoveBitsUp(list.bit, to, moved, &high_);
   ClearBits(to + moved, list.count + newer.size() + num_spans - moved, &high_);
-  for (size_t posting = first + list.count; const WordAndNumber& number : newer) {
-    const Waiting& waiting = waiting_[number.second];
+  for (size_t posting = first + list.count; const Waiting& waiting : newer) {
     const size_t bit = posting + word * num_spans + (waiting.keyframe >> kLowBits);
     high_[bit / 64] |= uint64_t{1} << (bit % 64);
     low_[posting] = static_cast<uint8_t>(waiting.keyframe);

@@ -42,14 +42,14 @@ Postings Expected(const Postings& list, size_t most, size_t phase, uint32_t of) 
 
 // Few words, so that lists are long; keyframes next to each other and far apart.
 TEST(PostingLists, VisitsWhatPlainListsWouldWheneverItIsPacked) {
-  constexpr uint32_t kWords = 12;
+  constexpr uint32_t kWords = 80;
   std::mt19937_64 rng(1);
   for (const int pack_every : {1, 7, 50, 1000}) {
     PostingLists lists(kWords);
     std::map<uint32_t, Postings> plain;
     int32_t keyframe = 0;
     for (int n = 0; n < 120; ++n) {
-      for (int i = 0; i < 20; ++i) {
+      for (int i = 0; i < 30; ++i) {
         const auto word = static_cast<uint32_t>(rng() % (kWords - 1));  // the last has none
         const auto signature = static_cast<uint32_t>(rng());
         lists.Add(word, keyframe, signature);
