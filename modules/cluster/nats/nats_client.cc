@@ -20,6 +20,10 @@ constexpr int64_t kRetry_ms = 500;
 // For questions that are asked again anyway: a stream without a leader does not answer them, and
 // the caller has more to do.
 constexpr int64_t kQuestion_ms = 500;
+// For a message that any replica has: the first of a few questions, which double their time. The
+// host of the replica that is asked may be gone.
+constexpr int64_t kFirstQuestion_ms = 100;
+constexpr int64_t kLastQuestion_ms = 800;
 constexpr int64_t kNanosecondsPerMicrosecond = 1000;
 constexpr int64_t kMaxUnacknowledged = 100'000;  // NATS' own default would stop a large cluster
 constexpr char kUtimeHeader[] = "Pangea-Utime";
@@ -33,10 +37,10 @@ std::vector<uint8_t> DataOf(const natsMsg* message) {
   return {data, data + natsMsg_GetDataLength(message)};
 }
 
-jsOptions QuestionOptions() {
+jsOptions QuestionOptions(int64_t wait_ms = kQuestion_ms) {
   jsOptions options{};
   jsOptions_Init(&options);
-  options.Wait = kQuestion_ms;
+  options.Wait = wait_ms;
   return options;
 }
 
@@ -106,12 +110,18 @@ struct NatsClient::Impl {
     Check(status, error, what);
   }
 
+  // NATS asks one replica, and notices after half a minute that its host is gone.
   std::optional<Message> Get(const std::string& stream, jsDirectGetMsgOptions* which) const {
     if (natsConnection_Status(connection.get()) != NATS_CONN_STATUS_CONNECTED) {
       return std::nullopt;
     }
     natsMsg* got = nullptr;
-    const natsStatus status = js_DirectGetMsg(&got, context.get(), stream.c_str(), nullptr, which);
+    natsStatus status = NATS_TIMEOUT;
+    for (int64_t wait_ms = kFirstQuestion_ms; wait_ms <= kLastQuestion_ms && status == NATS_TIMEOUT;
+         wait_ms *= 2) {
+      jsOptions options = QuestionOptions(wait_ms);
+      status = js_DirectGetMsg(&got, context.get(), stream.c_str(), &options, which);
+    }
     const NatsOwned<natsMsg> message(got);
     if (status != NATS_OK) {
       return std::nullopt;
