@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <thread>
 
+#include "bus/status_log.h"
 #include "cluster/bridge_test_world.h"
 #include "files/text_file.h"
 #include "files/whole_file.h"
@@ -118,6 +119,16 @@ TEST_F(Access, AServerOfAnotherAuthorityIsNotTrusted) {
   NatsAccess access = As("worker");
   access.ca = other / "ca.pem";
   EXPECT_THAT(Why(access), HasSubstr("certificate is not of the authority in"));
+}
+
+TEST_F(Access, ASiteOfAnotherUserIsRefusedWithTheReason) {
+  testing::internal::CaptureStderr();
+  StartLog("test", "");
+  SiteStreams attic(As("worker"), "attic");
+  EXPECT_FALSE(attic.AreThere());
+  const std::string said = testing::internal::GetCapturedStderr();
+  EXPECT_THAT(said,
+              testing::ContainsRegex("STREAM.INFO.pangea-attic-result.*--credentials of this"));
 }
 
 TEST_F(Access, AWorkerStoresResultsAndNothingElse) {

@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <atomic>
 #include <stdexcept>
 #include <vector>
+
+#include "bus/status_log.h"
 
 namespace pangea {
 namespace {
@@ -46,6 +49,19 @@ std::string WhyNotConnected(natsStatus status, const NatsAccess& access) {
   }
 }
 
+// On a thread of libnats. What is refused is not answered, and asked again and again: said once.
+void SayWhatIsRefused(natsConnection* connection, natsSubscription*, natsStatus status, void*) {
+  static std::atomic_flag said;
+  const char* text = nullptr;
+  if (status == NATS_NOT_PERMITTED && !said.test_and_set()) {
+    natsConnection_GetLastError(connection, &text);
+    Log("pangea-bridge",
+        fmt::format("NATS refuses its user: {}: are --credentials of this site and role, and "
+                    "nats.conf as the newest pangea-nats-config makes it?",
+                    text));
+  }
+}
+
 NatsOwned<natsOptions> OptionsOf(const NatsAccess& access, const std::string& name,
                                  int64_t timeout_ms) {
   natsOptions* made = nullptr;
@@ -53,6 +69,7 @@ NatsOwned<natsOptions> OptionsOf(const NatsAccess& access, const std::string& na
   NatsOwned<natsOptions> options(made);
   natsOptions_SetName(made, name.c_str());
   natsOptions_SetTimeout(made, timeout_ms);
+  natsOptions_SetErrorHandler(made, SayWhatIsRefused, nullptr);
   natsOptions_SetMaxReconnect(made, -1);
   natsOptions_SetReconnectWait(made, kReconnectWait_ms);
   natsOptions_SetReconnectJitter(made, kReconnectJitter_ms, kReconnectJitter_ms);
