@@ -92,6 +92,7 @@ void PostingLists::Add(uint32_t word, int32_t keyframe, uint32_t signature) {
 void PostingLists::Group() {
   // In place: from the last block to the first each group moves to its new place.
   size_t to = num_waiting();
+  grouped_.reserve(to);  // without spare capacity
   grouped_.resize(to);
   for (size_t block = waiting_.size(); block-- > 0;) {
     const auto group_end = static_cast<uint32_t>(to);
@@ -183,7 +184,7 @@ void PostingLists::Pack() {
     begin_[block] = first[block << block_shift_];
   }
   waiting_.assign(begin_.size(), {});
-  grouped_.clear();
+  grouped_ = {};
 }
 
 void PostingLists::PackWord(const PackedList& list, size_t word, size_t num_spans, size_t first,
