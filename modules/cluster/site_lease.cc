@@ -21,7 +21,8 @@ std::optional<std::string> SiteLease::HolderAt(uint64_t sequence) {
 
 bool SiteLease::Write(const std::string& record, uint64_t behind, int64_t now_utime) {
   const NatsClient::StoreAnswer answer = records_.StoreLease(record, behind);
-  if (answer.stored != NatsClient::Stored::kNew) {
+  renewed_ = answer.stored == NatsClient::Stored::kNew;
+  if (!renewed_) {
     return false;
   }
   sequence_ = answer.sequence;

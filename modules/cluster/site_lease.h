@@ -63,7 +63,9 @@ class SiteLease {
 
   // The term with which the lease was taken.
   uint64_t term() const { return term_; }
-  bool fresh(int64_t now_utime) const { return now_utime - renewed_utime_ < kFresh_us; }
+  // False also after a renewal that failed: it may have waited for NATS longer than `now_utime`
+  // says.
+  bool fresh(int64_t now_utime) const { return renewed_ && now_utime - renewed_utime_ < kFresh_us; }
   // Whether the newest record that TryAcquire has seen is another host's.
   bool is_anothers() const;
   // For people: the last known holder.
@@ -80,6 +82,7 @@ class SiteLease {
   uint64_t term_ = 0;
   uint64_t sequence_ = 0;  // of our newest record, while we hold the lease
   int64_t renewed_utime_ = 0;
+  bool renewed_ = false;          // whether the last renewal was stored
   std::optional<uint64_t> seen_;  // sequence of the newest record, while another holds it
   std::string seen_holder_;
   int64_t seen_utime_ = 0;                // when this record was first seen

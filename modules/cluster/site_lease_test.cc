@@ -84,6 +84,17 @@ TEST_F(SiteLeaseTest, AnOldRecordOfOursDoesNotHideTheNewHolder) {
   EXPECT_EQ(first.seen_holder(), "second");
 }
 
+// Seen: a server that was cut off waited 2 s for NATS, and answered agents for 5.4 s.
+TEST_F(SiteLeaseTest, WhatCouldNotBeRenewedIsNotFresh) {
+  ASSERT_TRUE(first.TryAcquire(kSecond));
+  records.former_leader = true;
+  EXPECT_TRUE(first.Renew(2 * kSecond));
+  EXPECT_FALSE(first.fresh(2 * kSecond));
+  records.former_leader = false;
+  EXPECT_TRUE(first.Renew(2 * kSecond));
+  EXPECT_TRUE(first.fresh(2 * kSecond));
+}
+
 // Seen after a cut of 30 s: both hosts gave the site up.
 TEST_F(SiteLeaseTest, AFormerLeadersRecordDoesNotTakeItFromItsHolder) {
   ASSERT_TRUE(first.TryAcquire(kSecond));
