@@ -37,7 +37,8 @@ LinkBridge::LinkBridge(Bus& link_bus, NatsClient& nats, const std::string& site,
       nats_(nats),
       site_(CheckedSite(site)),
       end_(end),
-      heard_subject_(SubjectOf(end == End::kEdge ? "down" : "up", "*")) {
+      heard_prefix_(SubjectOf(end == End::kEdge ? "down" : "up", "")),
+      heard_subject_(heard_prefix_ + "*") {
   nats_.Listen(heard_subject_);
   link_bus.Subscribe(
       std::string(end == End::kEdge ? channels::kAllLinkUps : channels::kAllLinkDowns),
@@ -74,8 +75,7 @@ void LinkBridge::OnPacket(const std::string& channel, Bytes packet) {
 void LinkBridge::BetweenMessages(int64_t now_utime) {
   now_utime_ = now_utime;
   while (const auto heard = nats_.NextHeard(heard_subject_)) {
-    const size_t prefix = heard_subject_.size() - 1;  // without the wildcard
-    const int32_t agent_id = channels::AgentOf(heard->subject, heard->subject.substr(0, prefix));
+    const int32_t agent_id = channels::AgentOf(heard->subject, heard_prefix_);
     if (agent_id == 0 || heard->data.size() > kMaxLinkPacketBytes) {
       continue;
     }

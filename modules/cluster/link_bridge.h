@@ -64,7 +64,7 @@ class LinkBridge : public Process {
   NatsClient& nats_;
   const std::string site_;
   const End end_;
-  const std::string heard_subject_;
+  const std::string heard_prefix_, heard_subject_;
   RecentPackets recent_;
   Counters counters_;
   std::map<int32_t, int64_t> heard_utime_;  // by agent: when a packet last came over NATS
