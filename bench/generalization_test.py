@@ -71,7 +71,7 @@ class SpoilTest(unittest.TestCase):
                                                  ("imu0", IMU, 5_000_000, 6 * ["0.0"], 4000)):
             (self.mav0 / name).mkdir(parents=True)
             (self.mav0 / name / "sensor.yaml").write_text(yaml)
-            rows = [",".join([str(NS + step * i), *columns]) for i in range(count)]
+            rows = [",".join([str(NS + step * i), *columns]).replace("x.png", f"{i}.png") for i in range(count)]
             (self.mav0 / name / "data.csv").write_text("#stamp\n" + "\n".join(rows) + "\n")
 
     def spoiled(self, what):
@@ -150,6 +150,14 @@ class SpoilTest(unittest.TestCase):
             self.assertNotEqual(sorted(stamps), stamps)
             self.assertGreater(len(rows), len(before))
             self.assertEqual(sorted(set(stamps)), [int(row[0]) for row in before])
+
+    def test_repeated_images(self):
+        before, at_60_hz = Recording(self.mav0), self.spoiled("copies_at_60_hz")
+        self.assertEqual([row[1] for row in at_60_hz.images[::3]], [row[1] for row in before.images])
+        self.assertEqual(int(at_60_hz.images[1][0]) - int(at_60_hz.images[0][0]), NS // 60)
+        for what, times in (("repeated_images", 0.2), ("shown_too_early", 0.5)):
+            names = [row[1] for row in self.spoiled(what).images]
+            self.assertAlmostEqual(sum(a == b for a, b in zip(names, names[1:])), times * len(names), delta=25)
 
     def test_calibration(self):
         self.assertEqual(numbers(self.spoiled("focal_length").camera_yaml, "intrinsics"), [402, 412.05, 320, 240])

@@ -58,6 +58,9 @@ WORLDS = [
     World("extrinsics", "extrinsics off by 0.5 degrees", source="flight", spoiled=("extrinsics",)),
     World("late_images", "clocks 40 ms apart", source="flight", spoiled=("late_images",)),
     World("jitter", "images stamped to 2 ms", source="flight", spoiled=("jitter",)),
+    World("copies_at_60_hz", "each image again at 60 Hz", source="flight", spoiled=("copies_at_60_hz",)),
+    World("repeated_images", "one in five images repeats the one before", source="flight", spoiled=("repeated_images",)),
+    World("shown_too_early", "every other image shows the one after it", source="flight", spoiled=("shown_too_early",)),
     World("accel_bias", "accelerometer off by 0.3 m/s^2", source="flight", spoiled=("accel_bias",)),
 ]
 PAIRS = [("flight", "phone"), ("flight", "dark"), ("small", "phone"), ("room", "wide"), ("room_phone", "wide"), ("mh02", "mh03"),

@@ -240,10 +240,33 @@ def browser_stamps(recording):
         row[0] = str(int(row[0]) + int(rng.gauss(0, 8_000_000)))
 
 
+def copies_at_60_hz(recording):
+    """Each image again every 60th of a second until the next one, as a browser shows them."""
+    stamps = [int(row[0]) for row in recording.images]
+    ends = [*stamps[1:], 2 * stamps[-1] - stamps[-2]]
+    recording.images = [[str(stamp), *row[1:]] for row, begin, end in zip(recording.images, stamps, ends)
+                        for stamp in range(begin, end - NS // 120, NS // 60)]
+
+
+def repeated_images(recording):
+    """One in five images repeats the one before it, as of a camera that drops images."""
+    rng = random.Random("repeated images")
+    for before, row in zip(recording.images, recording.images[1:]):
+        if rng.random() < 0.2:
+            row[1] = before[1]
+
+
+def shown_too_early(recording):
+    """Every other image shows the one after it: its last stamp is the right one."""
+    for row, after in zip(recording.images[::2], recording.images[1::2]):
+        row[1] = after[1]
+
+
 SPOILERS = {f.__name__: f for f in (half_rate, image_gaps, lone_images, imu_gaps, disorder, focal_length, extrinsics, late_images,
                                     jitter, accel_bias, phone_imu, noise_10_times, noise_a_tenth, third_of_imu, large_accel_bias,
                                     accel_scale, lost_imu, doubled_imu, browser_motion, browser_stamps, covered, hand, pocket,
-                                    exposure_steps, people, crowd)}
+                                    exposure_steps, people, crowd,
+                                    copies_at_60_hz, repeated_images, shown_too_early)}
 
 
 def main():

@@ -31,7 +31,8 @@ Input Empty(int width, int height, const ImuNoise& noise,
 Collector::Collector(int width, int height, const ImuNoise& noise,
                      const std::optional<Eigen::Quaterniond>& q_body_cam)
     : input_(Empty(width, height, noise, q_body_cam)),
-      tracker_(GuessedCamera(width, height), Forgiving()) {}
+      tracker_(GuessedCamera(width, height), Forgiving()),
+      repeated_images_(GuessedCamera(width, height)) {}
 
 void Collector::AddImu(const ImuSample& sample) {
   if (IsPlausible(sample) && (input_.imu.empty() || sample.utime > input_.imu.back().utime)) {
@@ -43,7 +44,13 @@ void Collector::AddImage(int64_t utime, const cv::Mat& image) {
   if (!input_.frames.empty() && utime <= input_.frames.back().utime) {
     return;
   }
-  input_.frames.push_back(tracker_.Track(utime, image, Eigen::Quaterniond::Identity()));
+  // The camera's rotation is not known yet: only equal pixels and the features' speed tell.
+  const auto unknown = Eigen::Quaterniond::Identity();
+  if (repeated_images_.IsRepeat(utime, image, unknown, 0)) {
+    return;
+  }
+  input_.frames.push_back(tracker_.Track(utime, image, unknown));
+  repeated_images_.NoteNew(image, input_.frames.back());
 }
 
 void Collector::Forget(int64_t before_utime) {

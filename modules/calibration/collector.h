@@ -2,13 +2,15 @@
 
 // Collects the input of a calibration image by image, from an uncalibrated camera. Of images and of
 // samples, each kind in time order, either may be ahead of the other. An image or sample that is
-// not later than the last one is ignored, and so is an implausible sample.
+// not later than the last one is ignored, and so is an implausible sample, and an image that
+// repeats the last one (repeated_images.h).
 
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
 #include <optional>
 
 #include "calibration/calibrate.h"
+#include "vio/front_end/repeated_images.h"
 #include "vio/front_end/tracker.h"
 
 namespace pangea::calibration {
@@ -30,6 +32,7 @@ class Collector {
  private:
   Input input_;
   vio::Tracker tracker_;
+  vio::RepeatedImages repeated_images_;
 };
 
 }  // namespace pangea::calibration

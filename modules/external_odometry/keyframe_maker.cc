@@ -7,6 +7,7 @@ namespace {
 
 constexpr size_t kMaxObservations = 60;
 constexpr double kMinInverseDepth = 0.01;  // 1/m
+constexpr double kRotationError = 0.02;    // largest, of the odometry's rotation rate, rad/s
 
 }  // namespace
 
@@ -15,6 +16,7 @@ KeyframeMaker::KeyframeMaker(const MapId& map, const CameraModel& camera,
     : options_(options),
       camera_(camera),
       tracker_(camera, vio::TrackerOptions{}),
+      repeated_images_(camera),
       describer_(camera, vio::DescriberOptions{}),
       next_{map, 0} {}
 
@@ -25,7 +27,13 @@ std::optional<Keyframe> KeyframeMaker::Add(int64_t utime, const cv::Mat& image,
   const Eigen::Quaterniond q_cam_lastcam =
       last_ ? T_odom_cam.q.conjugate() * (last_->T_odom_body * camera_.T_body_cam).q
             : Eigen::Quaterniond::Identity();
+  if (last_ && repeated_images_.IsRepeat(
+                   utime, image, q_cam_lastcam,
+                   kRotationError * 1e-6 * static_cast<double>(utime - last_->utime))) {
+    return std::nullopt;
+  }
   const vio::TrackedFrame& frame = tracker_.Track(utime, image, q_cam_lastcam);
+  repeated_images_.NoteNew(image, frame);
   std::map<int32_t, std::deque<Observation>> seen;  // drops the tracks that ended
   for (const vio::Observation& observation : frame.observations) {
     auto& observations = seen[observation.landmark_id];

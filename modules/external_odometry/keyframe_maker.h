@@ -15,6 +15,7 @@
 
 #include "core/keyframe.h"
 #include "vio/front_end/describer.h"
+#include "vio/front_end/repeated_images.h"
 #include "vio/front_end/tracker.h"
 
 namespace pangea {
@@ -38,7 +39,8 @@ class KeyframeMaker {
   KeyframeMaker(const MapId& map, const CameraModel& camera, const KeyframeMakerOptions& options);
 
   // `T_odom_body`: body is the IMU (or the frame that `camera.T_body_cam` refers to); the z axis of
-  // odom points up. Call with ascending `utime`. Returns a keyframe if one is due.
+  // odom points up. Call with ascending `utime`. Returns a keyframe if one is due. An image that
+  // repeats the last one (repeated_images.h) does not belong to its pose, and is ignored.
   std::optional<Keyframe> Add(int64_t utime, const cv::Mat& image, const Rigid3& T_odom_body);
   // Number of features in the newest image.
   int num_tracked() const { return static_cast<int>(observations_.size()); }
@@ -60,6 +62,7 @@ class KeyframeMaker {
   KeyframeMakerOptions options_;
   CameraModel camera_;
   vio::Tracker tracker_;
+  vio::RepeatedImages repeated_images_;
   vio::Describer describer_;
   KeyframeId next_;
   std::optional<Step> last_, last_keyframe_;

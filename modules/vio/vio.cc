@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <iterator>
 #include <utility>
 
 #include "core/rigid3.h"
@@ -11,6 +13,16 @@ namespace pangea::vio {
 namespace {
 
 constexpr size_t kMaxPoints = 150;  // map points of a keyframe: the most certain ones
+
+// Largest error of the gyroscope's bias, rad/s: before the start, and while tracking.
+constexpr double kUnknownBias = 0.15;
+constexpr double kKnownBias = 0.02;
+constexpr double kMiddleRow = 0.5;
+
+// The time of the image's middle row.
+int64_t CalibratedImuTime(const CameraModel& camera, int64_t image_utime) {
+  return image_utime + std::llround(1e6 * (camera.time_offset_s + kMiddleRow * camera.readout_s));
+}
 
 }  // namespace
 
@@ -22,6 +34,8 @@ Vio::Vio(int32_t agent_id, const CameraModel& camera, const ImuNoise& noise,
       options_(options),
       open_map_(std::move(open_map)),
       tracker_(camera, options.tracker),
+      repeated_images_(camera),
+      repeat_stamps_(camera),
       describer_(camera, options.describer) {
   OpenNewMap();
 }
@@ -38,6 +52,10 @@ void Vio::OpenNewMap() {
   scale_sigma_.reset();
   described_.clear();
   tracker_.Reset();
+  repeated_images_.Reset();
+  repeat_stamps_.EndTracks();
+  waiting_imu_.clear();
+  held_.reset();
   estimator_.emplace(options_.estimator, camera_, noise_);
 }
 
@@ -50,34 +68,103 @@ int64_t Vio::ImuTimeOfRow(int64_t image_utime, double row) const {
   return image_utime + std::llround(1e6 * (offset_s + row * camera_.readout_s));
 }
 
-// The gyroscope's rotation between the last image's middle row and this one's, as a rotation of the
-// camera.
-Eigen::Quaterniond Vio::CameraRotation(int64_t utime) {
-  Eigen::Quaterniond q_last_now = Eigen::Quaterniond::Identity();
-  constexpr double kMiddleRow = 0.5;
-  const int64_t end = ImuTimeOfRow(utime, kMiddleRow);
-  if (last_utime_) {
-    int64_t at = ImuTimeOfRow(*last_utime_, kMiddleRow);
-    for (const ImuSample& sample : rotation_imu_) {
-      const int64_t until = std::min(sample.utime, end);
-      if (until > at) {
-        const double dt = 1e-6 * static_cast<double>(until - at);
-        q_last_now = q_last_now * ExpSo3((sample.gyro - gyro_bias_) * dt);
-        at = until;
-      }
-    }
-  }
-  std::erase_if(rotation_imu_, [end](const ImuSample& sample) { return sample.utime <= end; });
-  last_utime_ = utime;
+// The camera's rotation between two times: maps directions at the first to the second.
+Eigen::Quaterniond Vio::CameraRotation(int64_t from_imu_utime, int64_t to_imu_utime,
+                                       const Eigen::Vector3d& gyro_bias) const {
+  const Eigen::Quaterniond q_from_to =
+      gyro_rotation_.Between(from_imu_utime, to_imu_utime, gyro_bias);
   const Eigen::Quaterniond& q_body_cam = camera_.T_body_cam.q;
-  return (q_body_cam.conjugate() * q_last_now.conjugate() * q_body_cam).normalized();
+  return (q_body_cam.conjugate() * q_from_to.conjugate() * q_body_cam).normalized();
+}
+
+// From the last new image's middle row to this one's.
+Eigen::Quaterniond Vio::RotationSinceNew(int64_t utime) const {
+  return last_utime_ ? CameraRotation(ImuTimeOfRow(*last_utime_, kMiddleRow),
+                                      ImuTimeOfRow(utime, kMiddleRow), gyro_bias_)
+                     : Eigen::Quaterniond::Identity();
+}
+
+// With the calibrated time offset and without a bias, so that all results are comparable.
+Eigen::Quaterniond Vio::CalibratedRotation(int64_t from_utime, int64_t to_utime) const {
+  return CameraRotation(CalibratedImuTime(camera_, from_utime),
+                        CalibratedImuTime(camera_, to_utime), Eigen::Vector3d::Zero());
+}
+
+bool Vio::Repeats(int64_t utime, const cv::Mat& image) const {
+  if (!last_utime_) {
+    return false;
+  }
+  const double bias = map_has_poses_ ? kKnownBias : kUnknownBias;
+  return repeated_images_.IsRepeat(utime, image, RotationSinceNew(utime),
+                                   1e-6 * bias * static_cast<double>(utime - *last_utime_));
 }
 
 VioOutput Vio::AddImage(int64_t utime, const cv::Mat& image, std::span<const ImuSample> imu) {
-  rotation_imu_.insert(rotation_imu_.end(), imu.begin(), imu.end());
-  return Estimate(tracker_.Track(utime, image, CameraRotation(utime)), image, imu);
+  gyro_rotation_.Add(imu);
+  waiting_imu_.insert(waiting_imu_.end(), imu.begin(), imu.end());
+  return Repeats(utime, image) ? AddRepeat(utime) : AddNewImage(utime, image);
 }
 
+VioOutput Vio::AddRepeat(int64_t utime) {
+  repeat_stamps_.AddRepeat(utime);
+  if (held_) {
+    held_->frame.utime = *last_utime_ = utime;
+  }
+  VioOutput output;
+  output.utime = utime;
+  output.map = map_;
+  output.repeats = true;
+  return output;
+}
+
+VioOutput Vio::AddNewImage(int64_t utime, const cv::Mat& image) {
+  const TrackedFrame& frame = tracker_.Track(utime, image, RotationSinceNew(utime));
+  repeated_images_.NoteNew(image, frame);
+  repeat_stamps_.AddNew(frame, std::bind_front(&Vio::CalibratedRotation, this));
+  gyro_rotation_.ForgetUntil(
+      CalibratedImuTime(camera_, repeat_stamps_.oldest_utime().value_or(utime)));
+  last_utime_ = utime;
+  if (repeat_stamps_.last_is_right() != last_stamp_is_right_) {
+    return ChangeStamps();
+  }
+  return last_stamp_is_right_ ? Hold(frame, image)
+                              : Estimate(frame, image, std::exchange(waiting_imu_, {}));
+}
+
+// With other stamps the odometry starts anew, which is seldom later than its first start.
+VioOutput Vio::ChangeStamps() {
+  VioOutput output;
+  output.utime = *last_utime_;
+  output.map = map_;
+  output.reason = "images repeat, and the last stamp of each is the right one";
+  output.keyframes = StartAnew();
+  last_stamp_is_right_ = repeat_stamps_.last_is_right();
+  return output;
+}
+
+// Keeps the image until the next one, and estimates with the one before.
+VioOutput Vio::Hold(const TrackedFrame& frame, const cv::Mat& image) {
+  const auto ready = std::exchange(held_, HeldImage{frame, image.clone()});
+  if (ready) {
+    return Estimate(ready->frame, ready->image, TakeImuUntil(ready->frame.utime));
+  }
+  VioOutput output;
+  output.utime = frame.utime;
+  output.map = map_;
+  output.reason = "the image may come again";
+  return output;
+}
+
+// The waiting samples up to and including the first one at or after the image.
+std::vector<ImuSample> Vio::TakeImuUntil(int64_t image_utime) {
+  const int64_t end = ImuTimeOf(image_utime);
+  auto it = std::ranges::find_if(waiting_imu_,
+                                 [end](const ImuSample& sample) { return sample.utime >= end; });
+  it = it == waiting_imu_.end() ? it : std::next(it);
+  std::vector<ImuSample> taken(waiting_imu_.begin(), it);
+  waiting_imu_.erase(waiting_imu_.begin(), it);
+  return taken;
+}
 VioOutput Vio::AddTracks(const TrackedFrame& frame, const cv::Mat& image,
                          std::span<const ImuSample> imu) {
   return Estimate(frame, image, imu);
@@ -136,7 +223,7 @@ std::vector<Keyframe> Vio::Flush() { return Complete(estimator_->Flush()); }
 std::vector<Keyframe> Vio::StartAnew() {
   std::vector<Keyframe> keyframes = Flush();
   OpenNewMap();
-  rotation_imu_.clear();
+  gyro_rotation_.Clear();
   last_utime_.reset();
   return keyframes;
 }

@@ -19,6 +19,9 @@
 
 #include "core/keyframe.h"
 #include "vio/front_end/describer.h"
+#include "vio/front_end/gyro_rotation.h"
+#include "vio/front_end/repeat_stamps.h"
+#include "vio/front_end/repeated_images.h"
 #include "vio/front_end/tracker.h"
 #include "vio/window/estimator.h"
 
@@ -41,6 +44,9 @@ struct VioOutput {
   int64_t utime = 0;  // of the image
   EstimatorState state = EstimatorState::kInitialising;
   std::string reason;  // why it is not tracking
+  // The image is a copy of the last new one (repeated_images.h): it has no pose, and neither have
+  // the values below.
+  bool repeats = false;
   MapId map;
   Rigid3 T_odom_body;  // valid if state is kTracking
   Eigen::Vector3d v_odom_body = Eigen::Vector3d::Zero();
@@ -61,7 +67,8 @@ class Vio {
       OpenMap open_map);
 
   // Images must come in time order. `imu`: all samples after those of the previous call, up to and
-  // including the first one at or after ImuTimeOf(utime).
+  // including the first one at or after ImuTimeOf(utime). If images repeat and the last stamp is
+  // the right one (repeat_stamps.h), the result is that of the image before, when it is known.
   VioOutput AddImage(int64_t utime, const cv::Mat& image, std::span<const ImuSample> imu);
   // The same, with given tracks instead of those of the tracker.
   VioOutput AddTracks(const TrackedFrame& frame, const cv::Mat& image,
@@ -90,7 +97,16 @@ class Vio {
  private:
   void OpenNewMap();
   int64_t ImuTimeOfRow(int64_t image_utime, double row) const;  // row: 0 first, 1 last
-  Eigen::Quaterniond CameraRotation(int64_t utime);
+  Eigen::Quaterniond CameraRotation(int64_t from_imu_utime, int64_t to_imu_utime,
+                                    const Eigen::Vector3d& gyro_bias) const;
+  Eigen::Quaterniond RotationSinceNew(int64_t utime) const;
+  Eigen::Quaterniond CalibratedRotation(int64_t from_utime, int64_t to_utime) const;
+  bool Repeats(int64_t utime, const cv::Mat& image) const;
+  std::vector<ImuSample> TakeImuUntil(int64_t image_utime);
+  VioOutput AddRepeat(int64_t utime);
+  VioOutput AddNewImage(int64_t utime, const cv::Mat& image);
+  VioOutput ChangeStamps();
+  VioOutput Hold(const TrackedFrame& frame, const cv::Mat& image);
   VioOutput Estimate(const TrackedFrame& frame, const cv::Mat& image,
                      std::span<const ImuSample> imu);
   std::vector<Keyframe> Complete(const std::vector<FinishedKeyframe>& finished);
@@ -104,6 +120,8 @@ class Vio {
   VioOptions options_;
   OpenMap open_map_;
   Tracker tracker_;
+  RepeatedImages repeated_images_;
+  RepeatStamps repeat_stamps_;
   Describer describer_;
   std::optional<Estimator> estimator_;
   MapId map_;
@@ -113,8 +131,16 @@ class Vio {
   int64_t group_revision_ = 0;
   std::optional<double> scale_sigma_;
   Eigen::Vector3d gyro_bias_ = Eigen::Vector3d::Zero();
-  std::vector<ImuSample> rotation_imu_;  // samples needed for the camera's next rotation
-  std::optional<int64_t> last_utime_;
+  GyroRotation gyro_rotation_;
+  std::vector<ImuSample> waiting_imu_;  // not yet seen by the estimator
+  std::optional<int64_t> last_utime_;   // of the last new image
+  bool last_stamp_is_right_ = false;    // of images that repeat
+  // The newest image, which may come again, if its last stamp is the right one.
+  struct HeldImage {
+    TrackedFrame frame;
+    cv::Mat image;
+  };
+  std::optional<HeldImage> held_;
   std::map<int64_t, std::vector<Corner>> described_;  // corners of the window's keyframes, by utime
 };
 

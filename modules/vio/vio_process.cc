@@ -105,6 +105,11 @@ void VioProcess::NoteSaturation(std::span<const ImuSample> imu) {
 }
 
 void VioProcess::Handle(const VioOutput& output) {
+  if (output.repeats) {
+    ++num_repeated_;
+    node_.Set("images_repeated", num_repeated_);
+    return;
+  }
   if (!first_image_utime_) {
     first_image_utime_ = output.utime;
   }
@@ -235,6 +240,9 @@ std::string VioProcess::Totals() const {
   if (num_saturated_ > 0) {
     text +=
         fmt::format("; {} inertial samples were at the end of the sensor's range", num_saturated_);
+  }
+  if (num_repeated_ > 0) {
+    text += fmt::format("; {} more images repeat the one before them and have none", num_repeated_);
   }
   if (num_dropped_ > 0) {
     text += fmt::format("; {} more images were dropped, as this machine is too slow for real time",

@@ -124,6 +124,7 @@ class VioProcess : public Process {
   bool saturated_ = false;     // in the samples of the newest image
   int64_t num_saturated_ = 0;  // samples
   int64_t num_images_ = 0;
+  int64_t num_repeated_ = 0;  // images; not in num_images_
   int64_t num_poses_ = 0;
   int64_t num_keyframes_ = 0;
   int64_t lag_us_ = 0;
