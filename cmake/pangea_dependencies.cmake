@@ -3,7 +3,6 @@
 find_package(Boost 1.74 REQUIRED)
 find_package(OpenSSL 3.0 REQUIRED)
 find_package(Eigen3 3.4 REQUIRED NO_MODULE)
-find_package(Ceres 2.1 REQUIRED)
 find_package(OpenCV 4.5 REQUIRED COMPONENTS core imgproc imgcodecs features2d video calib3d)
 find_package(JPEG REQUIRED)
 find_package(PNG REQUIRED)
@@ -13,6 +12,16 @@ find_package(fmt REQUIRED)
 find_package(nlohmann_json REQUIRED)
 find_package(Threads REQUIRED)
 find_package(ZLIB REQUIRED)
+
+# Debian's Ceres, and its search for any BLAS, name ATLAS (libf77blas, libatlas) as libraries to link. A
+# program that links them computes with ATLAS, whichever libblas.so.3 the machine has: they come first.
+block()
+  set(BLA_VENDOR Generic)
+  find_package(Ceres 2.1 REQUIRED)
+endblock()
+get_target_property(ceres_libraries Ceres::ceres INTERFACE_LINK_LIBRARIES)
+list(FILTER ceres_libraries EXCLUDE REGEX "/lib(f77blas|atlas)[.]")
+set_target_properties(Ceres::ceres PROPERTIES INTERFACE_LINK_LIBRARIES "${ceres_libraries}")
 
 # Debian's LCM has no CMake package.
 find_path(LCM_INCLUDE_DIR lcm/lcm-cpp.hpp REQUIRED)

@@ -97,8 +97,9 @@ function(pangea_manual_page name)
   install(FILES ${page} DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT runtime)
 endfunction()
 
-# pangea_program(name [INTERNAL] SOURCES ... DEPENDS ...) defines a program, and a test that its
-# --help works. An INTERNAL program (e.g. a bench) is neither installed nor one of `programs`.
+# pangea_program(name [INTERNAL] SOURCES ... DEPENDS ...) defines a program, and tests that its --help
+# and --version work. An INTERNAL program (e.g. a bench) has no version, and is neither installed nor
+# one of `programs`.
 function(pangea_program name)
   if(EMSCRIPTEN)
     return()
@@ -118,6 +119,9 @@ function(pangea_program name)
     install(FILES ${CMAKE_SOURCE_DIR}/scripts/completion/pangea.bash RENAME ${name} COMPONENT runtime
       DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
     pangea_manual_page(${name})
+    add_test(NAME ${name}.version COMMAND ${name} --version)
+    set_tests_properties(${name}.version PROPERTIES LABELS unit
+      PASS_REGULAR_EXPRESSION "^${name} ${PROJECT_VERSION}\n")
   endif()
   add_test(NAME ${name}.help COMMAND ${name} --help)
   set_tests_properties(${name}.help PROPERTIES LABELS unit)

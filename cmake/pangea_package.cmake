@@ -16,8 +16,10 @@ set(CPACK_COMPONENT_RUNTIME_DESCRIPTION
   "Several phones map a building together: odometry, the link to the server, the server's\n\
 processes, scripted sessions, replay, the viewer; on the LCM message bus.")
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_SHLIBDEPS ON)
+# Without it, CHOLMOD computes with any BLAS; the reference one and ATLAS are slow (modules/blas).
+set(openblas "libopenblas0-serial | libopenblas0-pthread | libopenblas0-openmp")
 # Programs that ours start by name: every session starts lcm-logger, and its report gnuplot.
-set(CPACK_DEBIAN_RUNTIME_PACKAGE_DEPENDS "liblcm-bin, gnuplot-nox | gnuplot")
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_DEPENDS "liblcm-bin, gnuplot-nox | gnuplot, ${openblas}")
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_RECOMMENDS "python3")  # for the Python package pangea
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_SUGGESTS "liblcm-java, openjdk-17-jre, libjchart2d-java, nats-server")
 set(scripts ${CMAKE_SOURCE_DIR}/packaging/debian)
@@ -29,6 +31,6 @@ set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_COMPONENT_DEV_DESCRIPTION
   "The modules as libraries for find_package(pangea), their headers, and the messages\n\
 (lcmtypes) with their C++ headers.")
-string(JOIN ", " CPACK_DEBIAN_DEV_PACKAGE_DEPENDS libboost-dev libceres-dev libcli11-dev libfmt-dev
+string(JOIN ", " CPACK_DEBIAN_DEV_PACKAGE_DEPENDS ${openblas} libboost-dev libceres-dev libcli11-dev libfmt-dev
   libjpeg-dev liblcm-dev libopencv-dev libpng-dev libqrencode-dev libsodium-dev libssl-dev libsuitesparse-dev libyaml-cpp-dev libzstd-dev nlohmann-json3-dev zlib1g-dev)
 include(CPack)

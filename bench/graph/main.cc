@@ -10,7 +10,7 @@
 #include <string>
 
 #include "bench/process_use.h"
-#include "bus/process.h"
+#include "blas/blas.h"
 #include "g2o/g2o.h"
 #include "g2o/graph_solver.h"
 
@@ -97,7 +97,8 @@ int main(int argc, char** argv) {
   std::string path;
   app.add_option("graph", path, "g2o file")->required()->check(CLI::ExistingFile);
   CLI11_PARSE(app, argc, argv);
-  pangea::UseOneThread();
+  fmt::print(stderr, "{}\n", pangea::ToString(pangea::LoadedBlas()));
+  pangea::UseOneThread();  // for Ceres too
   try {
     const pangea::Graph graph = pangea::ReadG2o(path);
     const pangea::bench::Result ceres = pangea::bench::ByCeres(graph);

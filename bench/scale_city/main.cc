@@ -14,7 +14,7 @@
 
 #include "bench/cores/cores.h"
 #include "bench/scale_city/city.h"
-#include "bus/process.h"
+#include "blas/blas.h"
 #include "eval/metrics.h"
 #include "messages/channels.h"
 #include "messages/encoding.h"
@@ -187,7 +187,7 @@ int main(int argc, char** argv) {
   app.add_flag("--recognition-alone", arguments.recognition_alone, "the other cores get nothing");
   app.add_option("--journal", arguments.journal, "the city as a journal, to be made");
   CLI11_PARSE(app, argc, argv);
-  pangea::UseOneThread();
+  fmt::print(stderr, "{}\n", pangea::ToString(pangea::LoadedBlas()));
   try {
     fmt::print("{}\n", pangea::bench::Bench(arguments).Run().dump());
     return 0;

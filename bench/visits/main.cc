@@ -21,7 +21,7 @@
 #include "bench/recognition/input.h"
 #include "bench/visits/journal.h"
 #include "bench/visits/visit.h"
-#include "bus/process.h"
+#include "blas/blas.h"
 #include "eval/metrics.h"
 
 namespace pangea::bench {
@@ -219,9 +219,9 @@ int main(int argc, char** argv) {
   app.add_option("--thin-every", thin_every, "visits between thinnings; 0: never")
       ->capture_default_str();
   CLI11_PARSE(app, argc, argv);
-  pangea::UseOneThread();
   try {
     pangea::bench::Bench bench(pangea::bench::ReadRecordings(logs, truths));
+    fmt::print("{}\n", pangea::ToString(pangea::LoadedBlas()));
     pangea::bench::PrintHead();
     for (int visit = 0; visit < visits; ++visit) {
       pangea::bench::Row row = bench.Visit(visit);

@@ -133,6 +133,7 @@ void Run(const Arguments& arguments) {
 int main(int argc, char** argv) {
   CLI::App app("Makes an agent of any odometry: images and poses in, keyframes out",
                "pangea-own-odometry-example");
+  pangea::AddVersion(app);
   pangea::example::Arguments arguments;
   app.add_option("--agent", arguments.agent_id, "agent id")
       ->required()

@@ -59,6 +59,7 @@ int Run(const Arguments& a, const AgentHandlerOptions& options, const std::strin
 int RunCommandLine(int argc, char** argv) {
   CLI::App app("Takes keyframes of all agents, journals and acknowledges them",
                "pangea-agent-handler");
+  AddVersion(app);
   Arguments arguments;
   AgentHandlerOptions options;
   AddArguments(app, arguments, options);

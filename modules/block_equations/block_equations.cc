@@ -3,6 +3,8 @@
 #include <Eigen/CholmodSupport>
 #include <algorithm>
 
+#include "blas/blas.h"
+
 namespace pangea {
 namespace {
 
@@ -53,6 +55,7 @@ struct BlockEquations::Factor {
 BlockEquations::BlockEquations(const std::vector<int>& sizes,
                                const std::vector<std::vector<int>>& cliques)
     : first_column_{0}, factor_(std::make_unique<Factor>()) {
+  UseOneThread();
   for (const int size : sizes) {
     first_column_.push_back(first_column_.back() + size);
   }
@@ -132,6 +135,10 @@ void BlockEquations::Damp(double share) {
 bool BlockEquations::Factorise() {
   if (num_columns() == 0) {
     return true;
+  }
+  // OpenBLAS' dpotrf takes a NaN for positive, which LAPACK's and ATLAS' refuse.
+  if (!H_.coeffs().allFinite()) {
+    return false;
   }
   factor_->cholesky.factorize(H_);
   return factor_->cholesky.info() == Eigen::Success;

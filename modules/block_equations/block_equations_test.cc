@@ -1,10 +1,18 @@
 #include "block_equations/block_equations.h"
 
+#include <dlfcn.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
+#include <atomic>
+#include <limits>
 #include <random>
+#include <thread>
+
+// Stands before OpenBLAS' function of this name, and before none if this machine has another BLAS.
+static std::atomic<int> openblas_threads = 0;
+extern "C" void openblas_set_num_threads(int threads) { openblas_threads = threads; }
 
 namespace pangea {
 namespace {
@@ -116,6 +124,39 @@ TEST(BlockEquations, HasNoSolutionWhereAVariableIsFree) {
   EXPECT_FALSE(equations.Solve());
   equations.Add(1, 0, 0, Eigen::Matrix2d::Identity());
   EXPECT_TRUE(equations.Solve());
+}
+
+TEST(BlockEquations, HaveNoFactorWithANumberThatIsNone) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  BlockEquations equations({1, 1}, {{0, 1}});
+  const auto add = [&equations](size_t a, size_t b, double value) {
+    equations.Add(0, a, b, Eigen::Matrix<double, 1, 1>(value));
+  };
+  add(0, 0, 1);
+  add(1, 1, 1);
+  EXPECT_TRUE(equations.Factorise());
+  add(1, 0, nan);
+  EXPECT_FALSE(equations.Factorise());
+}
+
+// CHOLMOD links OpenMP, and its code requests four threads in this way. A thread of its own: what
+// OpenMP may do is said thread by thread.
+TEST(BlockEquations, SolveInOneThreadWhateverALibraryAsksFor) {
+  using Region = void (*)(void*);
+  void* const symbol = dlsym(RTLD_DEFAULT, "GOMP_parallel");
+  ASSERT_NE(symbol, nullptr);
+  const auto parallel = reinterpret_cast<void (*)(Region, void*, unsigned, unsigned)>(symbol);
+  std::atomic<int> entered = 0;
+  std::thread([&] {
+    const Region enter = [](void* count) { ++*static_cast<std::atomic<int>*>(count); };
+    parallel(enter, &entered, 4, 0);
+    EXPECT_EQ(entered.exchange(0), 4);
+    openblas_threads = 0;
+    const BlockEquations equations({1}, {{0}});
+    parallel(enter, &entered, 4, 0);
+  }).join();
+  EXPECT_EQ(entered, 1);
+  EXPECT_EQ(openblas_threads, 1);
 }
 
 TEST(BlockEquations, NoVariablesHaveASolution) {

@@ -1,7 +1,5 @@
 #include "bus/process.h"
 
-#include <dlfcn.h>
-
 #include <algorithm>
 #include <atomic>
 #include <csignal>
@@ -30,14 +28,6 @@ void InstallSignalHandlers() {
 bool StopRequested() { return stop_signals != 0; }
 
 int StopSignals() { return stop_signals; }
-
-// The function is looked up by name, because only programs with solvers link OpenMP. Without any
-// active level of parallel regions, each region runs in one thread.
-void UseOneThread() {
-  if (void* const symbol = dlsym(RTLD_DEFAULT, "omp_set_max_active_levels")) {
-    reinterpret_cast<void (*)(int)>(symbol)(0);
-  }
-}
 
 int RunProcess(LcmBus& bus, Process& process,
                const std::function<void(int64_t now_utime)>& between_messages) {

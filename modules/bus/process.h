@@ -29,10 +29,6 @@ void InstallSignalHandlers();
 bool StopRequested();
 int StopSignals();  // number of such signals so far
 
-// Makes OpenMP run everything in the calling thread. CHOLMOD would start three more threads even
-// with OMP_NUM_THREADS=1, because it asks OpenMP for four. Call this at the start of a program.
-void UseOneThread();
-
 // Handles messages and ticks until a signal; returns the exit code. `between_messages`, unless
 // empty, is called before the process' own Tick and BetweenMessages.
 int RunProcess(LcmBus& bus, Process& process,

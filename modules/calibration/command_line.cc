@@ -92,6 +92,7 @@ int Run(const Arguments& a) {
 int RunCommandLine(int argc, char** argv) {
   CLI::App app("Calibrates camera and IMU on a hand-held recording of 20 to 60 s",
                "pangea-calibrate");
+  AddVersion(app);
   Arguments arguments;
   AddOptions(app, arguments);
   app.footer(fmt::format(

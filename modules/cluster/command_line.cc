@@ -13,6 +13,7 @@ namespace pangea::cluster {
 
 int RunCommandLine(int argc, char** argv) {
   CLI::App app("Shares a site between hosts, over NATS", "pangea-bridge");
+  AddVersion(app);
   BridgeArguments arguments;
   app.add_option("--role", arguments.role,
                  "core: beside the server; worker: beside fusion and inter_map_ba; standby: until "

@@ -157,7 +157,8 @@ void CommandLine::RunRelative() const {
 }  // namespace
 
 int RunCommandLine(int argc, char** argv) {
-  CLI::App app("Errors of trajectories against ground truth");
+  CLI::App app("Errors of trajectories against ground truth", "pangea-eval");
+  AddVersion(app);
   CommandLine commands(app);
   CLI11_PARSE(app, argc, argv);
   try {

@@ -168,6 +168,7 @@ int RunCommandLine(int argc, char** argv) {
   CLI::App app(
       "Serves the phone's page, lets agents join by a code, and carries their link packets",
       "pangea-gateway");
+  AddVersion(app);
   GatewayArguments arguments;
   AddArguments(app, &arguments);
   try {

@@ -46,6 +46,7 @@ int RunCommandLine(int argc, char** argv) {
   CLI::App app(
       "Relays one agent's link between two buses, and loses, delays, reorders, doubles and cuts",
       "pangea-link-emulator");
+  AddVersion(app);
   Arguments arguments;
   AddArguments(app, arguments);
   OptionsArguments options_arguments(app);

@@ -313,6 +313,7 @@ void AddCommands(CLI::App& app, Arguments* arguments) {
 
 int RunCommandLine(int argc, char** argv) {
   CLI::App app("What is in a captured LCM log, parts of it, and other formats", "pangea-log");
+  AddVersion(app);
   app.require_subcommand(1);
   app.footer(
       "Exit code: 0; 1 when something could not be done; 2 when logs differ; 3 when something of a "

@@ -6,7 +6,6 @@
 #include <cstdio>
 #include <exception>
 #include <filesystem>
-#include <functional>
 #include <iostream>
 #include <stdexcept>
 #include <system_error>
@@ -41,6 +40,12 @@ std::string TextOf(const std::exception& error) {
 }
 
 }  // namespace
+
+void AddVersion(CLI::App& app, const std::function<std::string()>& more) {
+  app.set_version_flag("--version", [&app, more] {
+    return app.get_name() + " " PANGEA_VERSION + (more ? "\n" + more() : "");
+  });
+}
 
 int Failed(const std::string& program, const std::exception& error) {
   std::cerr << fmt::format("{}: {}\n", program, TextOf(error));

@@ -2,9 +2,13 @@
 
 #include <CLI/CLI.hpp>
 #include <exception>
+#include <functional>
 #include <string>
 
 namespace pangea {
+
+// Adds --version, which prints "pangea-vio 0.2.0" and what `more` returns below it.
+void AddVersion(CLI::App& app, const std::function<std::string()>& more = {});
 
 // Writes the error as one line on stderr, after the program's name. One of a file or folder begins
 // with its path, as those of files/text_file.h do. Returns 1, the exit code of the program.

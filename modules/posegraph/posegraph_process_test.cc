@@ -1,26 +1,7 @@
-#include <dlfcn.h>
-
-#include <atomic>
-
 #include "posegraph/test_server.h"
 
 namespace pangea {
 namespace {
-
-// CHOLMOD links OpenMP, and its code requests four threads in this way.
-TEST(Process, SolvesInOneThreadWhateverALibraryAsksFor) {
-  using Region = void (*)(void*);
-  void* const symbol = dlsym(RTLD_DEFAULT, "GOMP_parallel");
-  ASSERT_NE(symbol, nullptr);
-  const auto parallel = reinterpret_cast<void (*)(Region, void*, unsigned, unsigned)>(symbol);
-  std::atomic<int> entered = 0;
-  const Region enter = [](void* count) { ++*static_cast<std::atomic<int>*>(count); };
-  parallel(enter, &entered, 4, 0);
-  EXPECT_EQ(entered.exchange(0), 4);
-  UseOneThread();
-  parallel(enter, &entered, 4, 0);
-  EXPECT_EQ(entered, 1);
-}
 
 TEST(PoseGraphProcess, TellsEachAgentItsDriftAndTheMap) {
   const SyntheticWorld world = MakeWorld();

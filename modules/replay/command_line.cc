@@ -13,6 +13,7 @@ namespace pangea::replay {
 int RunCommandLine(int argc, char** argv) {
   CLI::App app("Plays stored keyframes onto an agent's bus, in place of an odometry",
                "pangea-keyframe-player");
+  AddVersion(app);
   KeyframePlayerOptions options;
   std::string bus_url = kDefaultBusUrl;
   std::string log, rate = "1";

@@ -293,7 +293,6 @@ void CheckMapsAreDistinct(const std::vector<fs::path>& logs,
 ReplaySummary Replay(const std::vector<fs::path>& logs, const ServerOptions& options,
                      double until_s, const fs::path& out_log, Progress& progress,
                      LogReadings* readings) {
-  UseOneThread();
   std::vector<std::vector<LoggedKeyframe>> by_log;
   LoggedEdits edits;
   for (const fs::path& log : logs) {
@@ -338,7 +337,6 @@ ReplaySummary Replay(const std::vector<fs::path>& logs, const ServerOptions& opt
 
 int64_t ReplayPart(const fs::path& log, const ReplayedPart& part, const fs::path& out_log,
                    Progress& progress, LogReadings* readings) {
-  UseOneThread();
   ReadKeyframeLog(log, readings);  // throws if keyframes are missing
   auto [begin_utime, messages] = ReadMessages(part.processes, log, part.until_s, readings);
   LocalBus bus;

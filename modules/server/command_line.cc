@@ -217,6 +217,7 @@ int Run(Arguments* arguments) {
 
 int RunCommandLine(int argc, char** argv) {
   CLI::App app("Runs the server's processes, and starts again what ends", "pangea-server");
+  AddVersion(app);
   Arguments arguments;
   AddArguments(app, &arguments);
   CLI11_PARSE(app, argc, argv);

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "blas/blas.h"
 #include "bus/process.h"
 #include "bus/wall_clock.h"
 #include "options/nearest_word.h"
@@ -228,6 +229,7 @@ void AddOptionsFolder(const fs::path& folder, ServerSetup* options) {
 
 int Serve(const ServerSetup& options) {
   InstallSignalHandlers();
+  Say(ToString(LoadedBlas()));
   fs::create_directories(options.logs);
   const bool is_core = !options.cluster.nats.empty();
   Checkpoints checkpoints(options.checkpoints, options.journal, options.logs);

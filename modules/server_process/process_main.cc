@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "blas/blas.h"
 #include "bus/options_announcer.h"
 #include "bus/status_log.h"
 #include "journal_follower/journal_first.h"
@@ -83,6 +84,7 @@ class WithOptions : public Process {
 int ProcessMain(int argc, char** argv, const ProcessDescription& description,
                 const ProcessFactory& factory) {
   CLI::App app(description.summary, description.name);
+  AddVersion(app, [] { return ToString(LoadedBlas()); });
   std::string url = kDefaultBusUrl;
   app.add_option("--bus", url, "LCM URL of the server bus")->capture_default_str();
   if (description.add_arguments) {
@@ -102,7 +104,7 @@ int ProcessMain(int argc, char** argv, const ProcessDescription& description,
     if (options.Printed(description.options)) {
       return 0;
     }
-    UseOneThread();
+    UseOneThread();  // OpenCV too uses a BLAS
     if (description.checkpoint != nullptr) {
       description.checkpoint->options = description.options.PrintWithoutHelp();
       description.checkpoint->writes = !journal.empty();
@@ -118,6 +120,7 @@ int ProcessMain(int argc, char** argv, const ProcessDescription& description,
                         OptionsAnnouncer(bus, NameOnTheBus(description.name),
                                          description.options.PrintWithoutHelp()));
     StartLog(description.name, fmt::format("bus {}, {}", url, options.Source()));
+    Log(description.name, ToString(LoadedBlas()));
     return RunProcess(bus, process, [&](int64_t now) { journal_first.Poll(now); });
   } catch (const std::exception& error) {
     return Failed(description.name, error);

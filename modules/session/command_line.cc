@@ -8,6 +8,7 @@ namespace pangea::session {
 int RunCommandLine(int argc, char** argv) {
   CLI::App app("Plays recordings through agents and server, and replays what was captured",
                "pangea-session");
+  AddVersion(app);
   app.require_subcommand(1);
   app.footer(
       "Exit code: 0; 1 when something could not be done; 2 when an expectation of the session file "

@@ -11,6 +11,7 @@
 #include <memory>
 #include <stdexcept>
 
+#include "blas/blas.h"
 #include "bus/process.h"
 #include "files/make_folder.h"
 #include "files/progress.h"
@@ -85,6 +86,7 @@ ServerOptions OptionsOf(const ReplayArguments& arguments, LogReadings* readings)
   LoggedOptions logged =
       ReadLoggedOptions({arguments.logs.begin(), arguments.logs.end()}, readings);
   Override(arguments.options, arguments.set, &logged.options);
+  std::cout << ToString(LoadedBlas()) << "\n";
   for (const std::string& note : logged.notes) {
     std::cout << note << "\n";
   }

@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "blas/blas.h"
 #include "options/command_line.h"
 #include "session/out_folder.h"
 #include "session/processes/player.h"
@@ -75,6 +76,7 @@ int Run(const RunArguments& arguments, LogReadings* readings) {
   CheckNothingIsReplaced(options.out, NamesOf(script));
   CheckNothingNeededIsIn(options.out, NeededBy(script, arguments.journal));
   const OutFolder out(options.out);
+  std::cout << ToString(LoadedBlas()) << std::endl;
   WriteRecordings(script, options.out);
   const RunSummary summary = RunSession(script, options);
   WriteTiming(summary.wall_s, options.out);

@@ -215,7 +215,9 @@ void CommandLine::Run() {
 }  // namespace
 
 int RunCommandLine(int argc, char** argv) {
-  CLI::App app("Renders a visual-inertial recording in EuRoC's format, with exact ground truth");
+  CLI::App app("Renders a visual-inertial recording in EuRoC's format, with exact ground truth",
+               "pangea-sim");
+  AddVersion(app);
   CommandLine command(app);
   CLI11_PARSE(app, argc, argv);
   try {

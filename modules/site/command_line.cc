@@ -266,6 +266,7 @@ void AddCommands(CLI::App& app, LogReadings* readings, bool* lost) {
 int RunCommandLine(int argc, char** argv) {
   CLI::App app("Makes, lists, backs up, merges, compacts, exports and deletes sites: named maps",
                "pangea-site");
+  AddVersion(app);
   app.require_subcommand(1);
   app.footer(
       "Exit code: 0; 1 when something could not be done; 3 when something of a journal is lost (it "

@@ -6,7 +6,6 @@
 #include <utility>
 #include <vector>
 
-#include "bus/process.h"
 #include "files/scratch_file.h"
 #include "messages/anchor_messages.h"
 #include "messages/channels.h"
@@ -48,7 +47,6 @@ void Take(const LogEvent& event, Thinning* thinning) {
 }  // namespace
 
 ThinnedJournal Thin(const std::filesystem::path& journal, const ThinJournal& how) {
-  UseOneThread();
   LogReadings readings;
   const ServerOptions options = ReadLoggedOptions({journal}, &readings).options;
   Thinning thinning({how.options, options.posegraph}, std::make_shared<ScratchFile>());

@@ -69,6 +69,7 @@ int Run(const Arguments& a, const UplinkOptions& options, const std::string& opt
 int RunCommandLine(int argc, char** argv) {
   CLI::App app("Carries one agent's keyframes to the server, and its corrections back",
                "pangea-uplink");
+  AddVersion(app);
   Arguments arguments;
   UplinkOptions options;
   AddArguments(app, arguments);

@@ -50,6 +50,7 @@ void AddArguments(CLI::App& app, Arguments& a) {
 
 int RunCommandLine(int argc, char** argv) {
   CLI::App app("Shows a running system, or a captured log, in a browser", "pangea-viewer");
+  AddVersion(app);
   Arguments a;
   AddArguments(app, a);
   CLI11_PARSE(app, argc, argv);

@@ -140,6 +140,7 @@ void KeepFreedMemory() {
 
 int RunCommandLine(int argc, char** argv) {
   CLI::App app("Visual-inertial odometry of one agent", "pangea-vio");
+  AddVersion(app);
   Arguments arguments;
   AddArguments(app, arguments);
   OptionsArguments options(app);

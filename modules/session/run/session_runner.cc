@@ -58,9 +58,6 @@ class Runner {
   RunSummary Run() {
     begin_ = Now();
     MakeFolder(options_.out / "logs");
-    // The processes are single-threaded by design; BLAS must not start threads.
-    setenv("OMP_NUM_THREADS", "1", 1);
-    setenv("OPENBLAS_NUM_THREADS", "1", 1);
     processes_.MakeKeys(script_);
     StartServer();
     StartLinks();
