@@ -64,7 +64,7 @@ std::string ToString(const Blas& blas) {
   }
   if (blas.is_slow) {
     text +=
-        ". WARNING: it takes about twice the CPU time of OpenBLAS: apt install "
+        ". WARNING: it takes up to twice the CPU time of OpenBLAS: apt install "
         "libopenblas0-serial; if that is installed: "
         "update-alternatives --auto libblas.so.3-" PANGEA_ARCHITECTURE;
   }
