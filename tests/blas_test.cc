@@ -45,10 +45,9 @@ class EachBlas : public testing::TestWithParam<Alternative> {
   void ExpectNamed(const std::string& output) const {
     EXPECT_THAT(output, HasSubstr(fmt::format("BLAS: {}", GetParam().name)));
     EXPECT_THAT(output, HasSubstr((folder_ / "libblas.so.3").string()));
-    const auto warning =
-        AllOf(HasSubstr("WARNING"), HasSubstr("apt install libopenblas0-serial"),
-              HasSubstr(fmt::format("update-alternatives --auto libblas.so.3-{}\n",
-                                    folder_.parent_path().filename().string())));
+    const auto warning = AllOf(HasSubstr("WARNING"), HasSubstr("apt install libopenblas0-serial"),
+                               HasSubstr(fmt::format("update-alternatives --auto libblas.so.3-{}\n",
+                                                     folder_.parent_path().filename().string())));
     if (GetParam().is_slow) {
       EXPECT_THAT(output, warning);
     } else {

@@ -158,8 +158,8 @@ VioOutput Vio::Hold(const TrackedFrame& frame, const cv::Mat& image) {
 // The waiting samples up to and including the first one at or after the image.
 std::vector<ImuSample> Vio::TakeImuUntil(int64_t image_utime) {
   const int64_t end = ImuTimeOf(image_utime);
-  auto it = std::ranges::find_if(waiting_imu_,
-                                 [end](const ImuSample& sample) { return sample.utime >= end; });
+  auto it = std::find_if(waiting_imu_.begin(), waiting_imu_.end(),
+                         [end](const ImuSample& sample) { return sample.utime >= end; });
   it = it == waiting_imu_.end() ? it : std::next(it);
   std::vector<ImuSample> taken(waiting_imu_.begin(), it);
   waiting_imu_.erase(waiting_imu_.begin(), it);

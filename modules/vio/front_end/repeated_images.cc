@@ -118,7 +118,8 @@ bool RepeatedImages::HasMovedLessThan(double shift_px, const cv::Mat& image) con
       shifts.push_back(*shift);
     }
   }
-  const auto small = std::ranges::count_if(shifts, [&](double one) { return one < shift_px; });
+  const auto small =
+      std::count_if(shifts.begin(), shifts.end(), [&](double one) { return one < shift_px; });
   return shifts.size() >= kMinPoints &&
          static_cast<double>(small) >= kShare * static_cast<double>(shifts.size());
 }
