@@ -3,7 +3,6 @@
 find_package(Boost 1.74 REQUIRED)
 find_package(OpenSSL 3.0 REQUIRED)
 find_package(Eigen3 3.4 REQUIRED NO_MODULE)
-find_package(OpenCV 4.5 REQUIRED COMPONENTS core imgproc imgcodecs features2d video calib3d)
 find_package(JPEG REQUIRED)
 find_package(PNG REQUIRED)
 find_package(yaml-cpp REQUIRED)
@@ -46,13 +45,18 @@ add_library(suitesparse::cholmod UNKNOWN IMPORTED)
 set_target_properties(suitesparse::cholmod PROPERTIES
   IMPORTED_LOCATION ${CHOLMOD_LIBRARY} INTERFACE_INCLUDE_DIRECTORIES ${CHOLMOD_INCLUDE_DIR})
 
-# OpenCV's package sets plain include directories. A SYSTEM target silences warnings in its headers.
+# OpenCV's CMake package is in Debian's libopencv-dev only, which installs 330 MB more than the parts
+# that are used. A SYSTEM target silences warnings in its headers.
+foreach(part core imgproc features2d video calib3d imgcodecs)
+  find_library(opencv_${part}_LIBRARY opencv_${part} REQUIRED)
+endforeach()
+find_path(OpenCV_INCLUDE_DIR opencv2/core.hpp PATH_SUFFIXES opencv4 REQUIRED)
 add_library(pangea_opencv INTERFACE IMPORTED)
-target_include_directories(pangea_opencv SYSTEM INTERFACE ${OpenCV_INCLUDE_DIRS})
-target_link_libraries(pangea_opencv INTERFACE
-  opencv_core opencv_imgproc opencv_features2d opencv_video opencv_calib3d)
+target_include_directories(pangea_opencv SYSTEM INTERFACE ${OpenCV_INCLUDE_DIR})
+target_link_libraries(pangea_opencv INTERFACE ${opencv_core_LIBRARY} ${opencv_imgproc_LIBRARY}
+  ${opencv_features2d_LIBRARY} ${opencv_video_LIBRARY} ${opencv_calib3d_LIBRARY})
 
 # For libraries that write image files or read them in any format. A target of its own, because
 # imgcodecs loads GDAL and many other libraries.
 add_library(pangea_image_files INTERFACE IMPORTED)
-target_link_libraries(pangea_image_files INTERFACE pangea_opencv opencv_imgcodecs)
+target_link_libraries(pangea_image_files INTERFACE pangea_opencv ${opencv_imgcodecs_LIBRARY})

@@ -153,6 +153,6 @@ def check():
     """Raises NotPermitted with the reason if this machine cannot make such hosts."""
     missing = [program for program in ("unshare", "nsenter", "setpriv", "ip", "nft") if not shutil.which(program)]
     if missing:
-        raise NotPermitted(f"no {', '.join(missing)} on this machine (scripts/setup installs them)")
+        raise NotPermitted(f"no {', '.join(missing)} on this machine (scripts/setup scripts/packages_test.txt installs them)")
     with Hosts(["probe"]) as hosts:
         hosts.lose("probe", 0.5)
