@@ -30,3 +30,6 @@ foreach(script pangea-nats-config pangea-spy)
   configure_file(${packaging}/${script} ${CMAKE_BINARY_DIR}/packaging/${script} @ONLY)
   install(PROGRAMS ${CMAKE_BINARY_DIR}/packaging/${script} DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT runtime)
 endforeach()
+# A captured session, for a first replay.
+install(FILES ${CMAKE_SOURCE_DIR}/logs/two_walks/session.lcm DESTINATION ${CMAKE_INSTALL_DATADIR}/pangea/logs/two_walks
+  COMPONENT runtime)
