@@ -21,11 +21,18 @@ std::string_view Trimmed(std::string_view text) {
   return text.substr(begin, text.find_last_not_of(kBlank) - begin + 1);
 }
 
+// Spreadsheets and some writers put texts into quotes.
+std::string_view WithoutQuotes(std::string_view field) {
+  const bool is_quoted = field.size() >= 2 && field.front() == field.back() &&
+                         (field.front() == '"' || field.front() == '\'');
+  return is_quoted ? Trimmed(field.substr(1, field.size() - 2)) : field;
+}
+
 std::vector<std::string> SplitAtCommas(std::string_view line) {
   std::vector<std::string> fields;
   for (size_t begin = 0; begin <= line.size();) {
     const size_t end = std::min(line.find(',', begin), line.size());
-    fields.emplace_back(Trimmed(line.substr(begin, end - begin)));
+    fields.emplace_back(WithoutQuotes(Trimmed(line.substr(begin, end - begin))));
     begin = end + 1;
   }
   return fields;

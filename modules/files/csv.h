@@ -17,9 +17,10 @@ struct CsvRow {
   bool line_ended = true;           // false: the file ends without a newline after this row
 };
 
-// Splits each line at commas or, if it has none, at blanks. Skips empty lines, those that begin
-// with '#', a header (line 1, if its first field is not a number), and the byte order mark that
-// editors write at the beginning. Throws as OpenFile (text_file.h).
+// Splits each line at commas or, if it has none, at blanks. Fields between commas may be in quotes.
+// Skips empty lines, those that begin with '#', a header (line 1, if its first field is not a
+// number), and the byte order mark that editors write at the beginning. Throws as OpenFile
+// (text_file.h).
 std::vector<CsvRow> ReadCsv(const std::string& path);
 
 // Converts a whole field. False if something is left over, on overflow, and for NaN or infinity.
@@ -33,6 +34,7 @@ class RowComplaints {
  public:
   explicit RowComplaints(std::string path) : path_(std::move(path)) {}
   void Add(int line, const std::string& what);
+  int count() const { return count_; }
   // One line of text per kept complaint, and "... and n more".
   std::vector<std::string> Lines() const;
   // Throws std::runtime_error when more than one row and more than a tenth of all rows are

@@ -14,7 +14,9 @@
 #include "files/text_file.h"
 #include "recording/euroc_calibration.h"
 #include "recording/grey_image.h"
+#include "recording/image_path.h"
 #include "recording/sensor_file.h"
+#include "recording/stamps.h"
 
 namespace pangea {
 namespace {
@@ -67,7 +69,7 @@ void NameImagesWithoutStamp(const std::string& mav0, const std::vector<CsvRow>& 
                             std::vector<std::string>* warnings) {
   std::set<std::string> named;
   for (const CsvRow& row : rows) {
-    named.insert(row.fields.back());
+    named.insert(fs::path(ImagePath(mav0, row.fields.back())).filename());
   }
   size_t unnamed = 0;
   std::string first;
@@ -106,44 +108,23 @@ bool IsFar(int64_t utime, int64_t middle_utime) {
 }
 
 template <typename T>
-void DropFarStamps(std::vector<T>* items, const std::string& path,
-                   std::vector<std::string>* warnings) {
+std::vector<int64_t> UtimesOf(const std::vector<T>& items) {
   std::vector<int64_t> utimes;
-  for (const T& item : *items) {
+  for (const T& item : items) {
     utimes.push_back(item.utime);
   }
-  const int64_t middle = Median(std::move(utimes));
+  return utimes;
+}
+
+template <typename T>
+void DropFarStamps(std::vector<T>* items, const std::string& path,
+                   std::vector<std::string>* warnings) {
+  const int64_t middle = Median(UtimesOf(*items));
   const size_t far =
       std::erase_if(*items, [middle](const T& item) { return IsFar(item.utime, middle); });
   if (far > 0) {
     warnings->push_back(
         fmt::format("{}: {} rows are stamped more than a day from the others; dropped", path, far));
-  }
-}
-
-// Warns of gaps that are much longer than the median period.
-template <typename T>
-void NameGaps(const std::vector<T>& items, double factor, const std::string& path,
-              std::vector<std::string>* warnings) {
-  if (items.size() < 3) {
-    return;
-  }
-  std::vector<int64_t> periods;
-  for (size_t i = 1; i < items.size(); ++i) {
-    periods.push_back(items[i].utime - items[i - 1].utime);
-  }
-  const double limit_us = factor * static_cast<double>(Median(periods));
-  constexpr int kNamed = 5;
-  int gaps = 0;
-  for (size_t i = 0; i < periods.size(); ++i) {
-    if (static_cast<double>(periods[i]) > limit_us && ++gaps <= kNamed) {
-      warnings->push_back(
-          fmt::format("{}: gap of {:.3f} s after {:.3f} s", path, 1e-6 * periods[i],
-                      1e-6 * static_cast<double>(items[i].utime - items.front().utime)));
-    }
-  }
-  if (gaps > kNamed) {
-    warnings->push_back(fmt::format("{}: ... and {} more gaps", path, gaps - kNamed));
   }
 }
 
@@ -244,12 +225,12 @@ void EurocRecording::ReadImages() {
       continue;
     }
     image.utime = UtimeFromNs(image.stamp_ns);
-    image.path = fmt::format("{}/cam0/data/{}", mav0_, row.fields[1]);
+    image.path = ImagePath(mav0_, row.fields[1]);
     std::error_code error;
     if (fs::is_regular_file(image.path, error)) {
       images_.push_back(std::move(image));
     } else {
-      missing.Add(row.line, fmt::format("image data/{} is missing", row.fields[1]));
+      missing.Add(row.line, fmt::format("image {} is missing", image.path));
     }
   }
   malformed.ThrowIfTooMany(rows.size(), "nanoseconds, file name");
@@ -260,12 +241,15 @@ void EurocRecording::ReadImages() {
     throw std::runtime_error(
         rows.empty()
             ? fmt::format("{}: holds no row; expected: nanoseconds, file name", csv)
-            : fmt::format("{}: none of its {} images is in {}/cam0/data", csv, rows.size(), mav0_));
+            : fmt::format(
+                  "{}: none of its {} images is in {}/cam0/data; the first is not there as {}", csv,
+                  rows.size(), mav0_, ImagePath(mav0_, rows.front().fields.back())));
   }
   DropFarStamps(&images_, csv, &warnings_);
   CheckUnitOfStamps(images_, csv);
   Warn(SortByTime(&images_), csv, &warnings_);
-  NameGaps(images_, 3.5, csv, &warnings_);
+  const std::string sensor_yaml = EurocCalibrationFile(mav0_, "cam0");
+  NameStamps(UtimesOf(images_), 3.5, csv, StatedRate(sensor_yaml, "cam0"), sensor_yaml, &warnings_);
 }
 
 void EurocRecording::ReadImu() {
@@ -301,7 +285,8 @@ void EurocRecording::ReadImu() {
   }
   DropFarStamps(&imu_, csv, &warnings_);
   Warn(SortByTime(&imu_), csv, &warnings_);
-  NameGaps(imu_, 2.5, csv, &warnings_);
+  const std::string sensor_yaml = EurocCalibrationFile(mav0_, "imu0");
+  NameStamps(UtimesOf(imu_), 2.5, csv, imu_noise_.rate_hz, sensor_yaml, &warnings_);
 }
 
 void EurocRecording::DropImagesOutsideImu() {

@@ -67,10 +67,62 @@ TEST_F(EurocTest, MissingImagesAreDroppedAndGapsNamed) {
   }
   const EurocRecording recording(root_);
   EXPECT_EQ(recording.images().size(), 7U);
-  EXPECT_THAT(recording.warnings(), Contains(HasSubstr("data.csv:6: image data/")));
+  EXPECT_THAT(recording.warnings(),
+              Contains(HasSubstr("data.csv:6: image " + ImagePath(4) + " is missing")));
   EXPECT_THAT(recording.warnings(), Contains(HasSubstr("gap of 0.200 s after 0.150 s")));
   fs::remove_all(root_ + "/mav0/cam0/data");
   EXPECT_THAT(Complaint(), HasSubstr("none of its 10 images"));
+}
+
+TEST_F(EurocTest, ImagesAreFoundHoweverTheyAreNamed) {
+  for (const auto& [before, after] : {std::pair<std::string, std::string>("\"", "\""),
+                                      {"'", "'"},
+                                      {"data/", ""},
+                                      {"\"data/", "\""},
+                                      {"./data/", ""},
+                                      {"cam0/data/", ""},
+                                      {"mav0/cam0/data/", ""},
+                                      {"data\\", ""},
+                                      {root_ + "/mav0/cam0/data/", ""}}) {
+    std::string cam = "#timestamp [ns],filename\n";
+    for (int i = 0; i < 10; ++i) {
+      const int64_t ns = kEurocTestStart_ns + i * int64_t{50000000};
+      cam += fmt::format("{},{}{}.png{}\n", ns, before, ns, after);
+    }
+    Write("cam0/data.csv", cam);
+    ASSERT_EQ(Complaint(), "") << before;
+    const EurocRecording recording(root_);
+    EXPECT_THAT(recording.warnings(), IsEmpty()) << before;
+    ASSERT_EQ(recording.images().size(), 10U) << before;
+    EXPECT_EQ(recording.images()[3].path, ImagePath(3)) << before;
+  }
+}
+
+TEST_F(EurocTest, AMissingImageIsNamedByWhatWasLookedFor) {
+  std::string cam;
+  for (int i = 0; i < 10; ++i) {
+    cam += fmt::format("{},left/{}.png\n", kEurocTestStart_ns + i * int64_t{50000000}, i);
+  }
+  Write("cam0/data.csv", cam);
+  EXPECT_THAT(Complaint(), HasSubstr("none of its 10 images is in " + root_ + "/mav0/cam0/data; "));
+  EXPECT_THAT(Complaint(),
+              HasSubstr("the first is not there as " + root_ + "/mav0/cam0/data/left/0.png"));
+}
+
+TEST_F(EurocTest, ARateThatIsNotTheImagesIsNamed) {
+  const std::string cam0 = Text("cam0/sensor.yaml"), imu0 = Text("imu0/sensor.yaml");
+  Write("cam0/sensor.yaml", cam0 + "rate_hz: 20\n");
+  EXPECT_THAT(EurocRecording(root_).warnings(), IsEmpty());
+  Write("cam0/sensor.yaml", cam0 + "rate_hz: 30\n");
+  EXPECT_THAT(
+      EurocRecording(root_).warnings(),
+      ElementsAre(HasSubstr("cam0/sensor.yaml: states 30 Hz, but by their stamps the rows")));
+  Write("cam0/sensor.yaml", cam0);
+  Write("imu0/sensor.yaml", imu0.substr(0, imu0.find("rate_hz")) + "rate_hz: 100\n" +
+                                imu0.substr(imu0.find("gyroscope_noise")));
+  EXPECT_THAT(EurocRecording(root_).warnings(),
+              ElementsAre(testing::AllOf(HasSubstr("imu0/sensor.yaml: states 100 Hz, but"),
+                                         HasSubstr(" come at 200 Hz"))));
 }
 
 TEST_F(EurocTest, CorruptAndMismatchedImagesAreNamedWhenLoaded) {

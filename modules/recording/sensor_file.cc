@@ -115,4 +115,16 @@ std::vector<std::string> UnreadFields(const std::string& path, const std::string
   return warnings;
 }
 
+std::optional<double> StatedRate(const std::string& path, const std::string& sensor) {
+  const YAML::Node fields = LoadSensorFile(ReadTextFile(path), path, sensor);
+  double rate_hz = 0;
+  for (const char* key : {"rate_hz", "update_rate"}) {
+    const YAML::Node node = fields[key];
+    if (node && node.IsScalar() && YAML::convert<double>::decode(node, rate_hz) && rate_hz > 0) {
+      return rate_hz;
+    }
+  }
+  return std::nullopt;
+}
+
 }  // namespace pangea

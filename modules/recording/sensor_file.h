@@ -4,6 +4,7 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,5 +17,8 @@ YAML::Node LoadSensorFile(std::string text, const std::string& path, const std::
 // A warning for each field of the file that nothing reads, with the field that was probably meant.
 // There is no warning for fields that EuRoC and Kalibr write for people.
 std::vector<std::string> UnreadFields(const std::string& path, const std::string& sensor);
+
+// The sensor's rate in the file, Hz; empty if it has none, or no number.
+std::optional<double> StatedRate(const std::string& path, const std::string& sensor);
 
 }  // namespace pangea

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <optional>
 #include <stdexcept>
 
 #include "files/csv.h"
@@ -16,46 +17,55 @@ namespace {
 constexpr double kMaxPosition_m = 1e9;
 constexpr double kMaxStamp_s = 4e12;  // so that differences of stamps fit 64 bits
 
-[[noreturn]] void Refuse(const std::string& path, const CsvRow& row, size_t column,
-                         const std::string& why) {
-  throw std::runtime_error(fmt::format("{}:{}: column {} '{}' is {}", path, row.line, column + 1,
-                                       row.fields[column], why));
-}
+// Why a row cannot be used.
+struct Fault {
+  bool is_other_format = false;  // else: its program had no pose here
+  std::string why;
+};
 
-// Throws unless the row's time stamp and pose are finite and within bounds.
-void CheckFinite(const std::string& path, const CsvRow& row) {
-  constexpr size_t kColumns = 8;
-  for (size_t i = 0; i < std::min(row.fields.size(), kColumns); ++i) {
+constexpr size_t kPoseColumns = 8;
+constexpr size_t kPositionColumns = 4;  // without a quaternion
+
+// A time stamp or pose that is not finite or beyond bounds: its program had failed there.
+std::optional<Fault> NotFinite(const CsvRow& row) {
+  for (size_t i = 0; i < std::min(row.fields.size(), kPoseColumns); ++i) {
     if (IsNotFinite(row.fields[i])) {
-      Refuse(path, row, i, "not a finite number");
+      return Fault{false,
+                   fmt::format("column {} '{}' is not a finite number", i + 1, row.fields[i])};
     }
     double metres = 0;
     if (i >= 1 && i <= 3 && ParseNumber(row.fields[i], &metres) &&
         std::abs(metres) > kMaxPosition_m) {
-      Refuse(path, row, i, fmt::format("not from {} to {} m", -kMaxPosition_m, kMaxPosition_m));
+      return Fault{false, fmt::format("column {} '{}' is not from {} to {} m", i + 1, row.fields[i],
+                                      -kMaxPosition_m, kMaxPosition_m)};
     }
   }
+  return std::nullopt;
 }
 
-// Parses seven numbers from fields[1] on; the format decides the quaternion's order. False, with a
-// reason, if they are malformed.
-bool ParsePose(const CsvRow& row, bool quaternion_w_first, Rigid3* pose, std::string* why) {
-  double v[7];
-  for (int i = 0; i < 7; ++i) {
+// Parses three or seven numbers from fields[1] on; the format decides the quaternion's order.
+std::optional<Fault> ParsePose(const CsvRow& row, bool quaternion_w_first, Rigid3* pose) {
+  double v[7] = {};
+  const size_t count = std::min(row.fields.size(), kPoseColumns) - 1;
+  for (size_t i = 0; i < count; ++i) {
     if (!ParseNumber(row.fields[1 + i], &v[i])) {
-      *why = fmt::format("column {} '{}' is not a finite number", i + 2, row.fields[1 + i]);
-      return false;
+      return Fault{true,
+                   fmt::format("column {} '{}' is not a finite number", i + 2, row.fields[1 + i])};
     }
   }
+  *pose = Rigid3();
   pose->t = {v[0], v[1], v[2]};
+  if (count == 3) {
+    return std::nullopt;
+  }
   pose->q = quaternion_w_first ? Eigen::Quaterniond(v[3], v[4], v[5], v[6])
                                : Eigen::Quaterniond(v[6], v[3], v[4], v[5]);
-  if (std::abs(pose->q.norm() - 1.0) > 0.05) {
-    *why = fmt::format("the quaternion has norm {:.3f}, not 1", pose->q.norm());
-    return false;
+  const double norm = pose->q.norm();
+  if (std::abs(norm - 1.0) > 0.05) {
+    return Fault{norm > 0, fmt::format("the quaternion has norm {:.3f}, not 1", norm)};
   }
   pose->q.normalize();
-  return true;
+  return std::nullopt;
 }
 
 }  // namespace
@@ -75,78 +85,117 @@ void Warn(const SortOutcome& outcome, const std::string& path, std::vector<std::
 
 namespace {
 
-// Parses a row's time stamp and pose. False, with a reason, when it is malformed.
-using RowParser = std::function<bool(const CsvRow& row, StampedPose* pose, std::string* why)>;
+// Parses a row's time stamp and pose.
+using RowParser = std::function<std::optional<Fault>(const CsvRow& row, StampedPose* pose)>;
 
-Trajectory ReadRows(const std::string& path, const std::string& expected, const RowParser& parse,
+Trajectory ReadRows(const std::string& path, const std::vector<CsvRow>& rows,
+                    const std::string& expected, const RowParser& parse,
                     std::vector<std::string>* warnings) {
-  const std::vector<CsvRow> rows = ReadCsv(path);
   Trajectory trajectory;
-  RowComplaints complaints(path);
+  RowComplaints other_format(path);
+  RowComplaints no_pose(path);
   for (const CsvRow& row : rows) {
     StampedPose pose;
-    std::string why;
-    CheckFinite(path, row);
-    if (parse(row, &pose, &why)) {
+    std::optional<Fault> fault = NotFinite(row);
+    fault = fault ? fault : parse(row, &pose);
+    if (!fault) {
       trajectory.push_back(pose);
     } else {
-      complaints.Add(row.line, why);
+      (fault->is_other_format ? other_format : no_pose).Add(row.line, fault->why);
     }
   }
-  complaints.ThrowIfTooMany(rows.size(), expected);
+  other_format.ThrowIfTooMany(rows.size(), expected);
+  std::vector<std::string> dropped = no_pose.Lines();
   if (trajectory.empty()) {
-    throw std::runtime_error(fmt::format("{}: holds no pose; expected rows: {}", path, expected));
+    throw std::runtime_error(
+        fmt::format("{}; expected rows: {}",
+                    dropped.empty() ? path + ": holds no pose" : dropped.front(), expected));
   }
-  for (const std::string& line : complaints.Lines()) {
-    warnings->push_back(line + "; row dropped");
+  for (const RowComplaints* complaints : {&other_format, &no_pose}) {
+    for (const std::string& line : complaints->Lines()) {
+      warnings->push_back(line + "; row dropped");
+    }
+  }
+  if (no_pose.count() > 1) {
+    warnings->push_back(
+        fmt::format("{}: {} of {} rows have no pose; dropped", path, no_pose.count(), rows.size()));
   }
   Warn(SortByTime(&trajectory), path, warnings);
   return trajectory;
 }
 
-bool ParseTumRow(const CsvRow& row, StampedPose* pose, std::string* why) {
-  double seconds = 0;
-  if (row.fields.size() != 8) {
-    *why = fmt::format("{} columns instead of 8", row.fields.size());
-    return false;
+std::optional<Fault> WrongColumns(const CsvRow& row, bool positions, bool is_euroc) {
+  const size_t columns = row.fields.size();
+  if (positions ? columns == kPositionColumns
+                : columns == kPoseColumns || (is_euroc && columns == 17)) {
+    return std::nullopt;
   }
-  if (!ParseNumber(row.fields[0], &seconds) || std::abs(seconds) > kMaxStamp_s) {
-    *why = fmt::format("'{}' is no stamp in seconds", row.fields[0]);
-    return false;
-  }
-  pose->utime = std::llround(seconds * 1e6);
-  return ParsePose(row, false, &pose->T, why);
+  return Fault{true, fmt::format("{} columns instead of {}", columns,
+                                 positions  ? "4"
+                                 : is_euroc ? "8 or 17"
+                                            : "8")};
 }
 
-bool ParseEurocRow(const CsvRow& row, StampedPose* pose, std::string* why) {
-  int64_t ns = 0;
-  if (row.fields.size() != 8 && row.fields.size() != 17) {
-    *why = fmt::format("{} columns instead of 8 or 17", row.fields.size());
-    return false;
-  }
-  if (!ParseNumber(row.fields[0], &ns)) {
-    *why = fmt::format("'{}' is no stamp in whole nanoseconds", row.fields[0]);
-    return false;
-  }
-  pose->utime = UtimeFromNs(ns);
-  return ParsePose(row, true, &pose->T, why);
+Trajectory ReadTumRows(const std::string& path, const std::vector<CsvRow>& rows, bool positions,
+                       std::vector<std::string>* warnings) {
+  const auto parse = [positions](const CsvRow& row, StampedPose* pose) -> std::optional<Fault> {
+    double seconds = 0;
+    if (auto fault = WrongColumns(row, positions, false)) {
+      return fault;
+    }
+    if (!ParseNumber(row.fields[0], &seconds) || std::abs(seconds) > kMaxStamp_s) {
+      return Fault{true, fmt::format("'{}' is no stamp in seconds", row.fields[0])};
+    }
+    pose->utime = std::llround(seconds * 1e6);
+    return ParsePose(row, false, &pose->T);
+  };
+  return ReadRows(path, rows, positions ? "seconds x y z" : "seconds tx ty tz qx qy qz qw", parse,
+                  warnings);
+}
+
+Trajectory ReadEurocRows(const std::string& path, const std::vector<CsvRow>& rows, bool positions,
+                         std::vector<std::string>* warnings) {
+  const auto parse = [positions](const CsvRow& row, StampedPose* pose) -> std::optional<Fault> {
+    int64_t ns = 0;
+    if (auto fault = WrongColumns(row, positions, true)) {
+      return fault;
+    }
+    if (!ParseNumber(row.fields[0], &ns)) {
+      return Fault{true, fmt::format("'{}' is no stamp in whole nanoseconds", row.fields[0])};
+    }
+    pose->utime = UtimeFromNs(ns);
+    return ParsePose(row, true, &pose->T);
+  };
+  return ReadRows(path, rows,
+                  positions ? "nanoseconds, x, y, z"
+                            : "nanoseconds, x, y, z, qw, qx, qy, qz (and 9 more, or none)",
+                  parse, warnings);
+}
+
+Trajectory ReadEither(const std::string& path, const std::vector<CsvRow>& rows, bool positions,
+                      std::vector<std::string>* warnings) {
+  return rows.empty() || !rows.front().has_commas ? ReadTumRows(path, rows, positions, warnings)
+                                                  : ReadEurocRows(path, rows, positions, warnings);
 }
 
 }  // namespace
 
 Trajectory ReadTum(const std::string& path, std::vector<std::string>* warnings) {
-  return ReadRows(path, "seconds tx ty tz qx qy qz qw", ParseTumRow, warnings);
+  return ReadTumRows(path, ReadCsv(path), false, warnings);
 }
 
 Trajectory ReadEurocGroundTruth(const std::string& path, std::vector<std::string>* warnings) {
-  return ReadRows(path, "nanoseconds, x, y, z, qw, qx, qy, qz (and 9 more, or none)", ParseEurocRow,
-                  warnings);
+  return ReadEurocRows(path, ReadCsv(path), false, warnings);
 }
 
 Trajectory ReadTrajectory(const std::string& path, std::vector<std::string>* warnings) {
+  return ReadEither(path, ReadCsv(path), false, warnings);
+}
+
+PosesOrPositions ReadPosesOrPositions(const std::string& path, std::vector<std::string>* warnings) {
   const std::vector<CsvRow> rows = ReadCsv(path);
-  return rows.empty() || !rows.front().has_commas ? ReadTum(path, warnings)
-                                                  : ReadEurocGroundTruth(path, warnings);
+  const bool positions = !rows.empty() && rows.front().fields.size() == kPositionColumns;
+  return {ReadEither(path, rows, positions, warnings), !positions};
 }
 
 void WriteTum(const std::string& path, const Trajectory& trajectory) {

@@ -1,8 +1,9 @@
 #pragma once
 
 // Reads trajectories from two text formats: TUM (tum.h) and EuRoC's ground-truth csv ("nanoseconds,
-// p (3), q w x y z" and, in 17 columns, velocity and biases). The readers sort by time, and drop
-// duplicates and malformed rows with a warning.
+// p (3), q w x y z" and, in 17 columns, velocity and biases). Either may have positions alone:
+// "stamp x y z". The readers sort by time, and drop duplicates, malformed rows, and rows without a
+// pose (not finite, or a quaternion of zeros) with a warning.
 
 #include <algorithm>
 #include <cstdint>
@@ -40,14 +41,19 @@ SortOutcome SortByTime(std::vector<Stamped>* rows) {
 // Adds a warning about the outcome, if there is a reason, for the file `path`.
 void Warn(const SortOutcome& outcome, const std::string& path, std::vector<std::string>* warnings);
 
-// The readers throw std::runtime_error when the file has nothing usable. They also throw, with the
-// line, for a time stamp or pose that is not finite or beyond 1e9 m: the program that wrote it had
-// failed, and an accuracy computed without that row would hide this. Repairs are added to
-// `warnings`.
+// The readers throw std::runtime_error when the file has nothing usable, or when more than a tenth
+// of its rows are of another format. Repairs are added to `warnings`.
 Trajectory ReadTum(const std::string& path, std::vector<std::string>* warnings);
 Trajectory ReadEurocGroundTruth(const std::string& path, std::vector<std::string>* warnings);
 // Reads either format; the first row decides: EuRoC's has commas.
 Trajectory ReadTrajectory(const std::string& path, std::vector<std::string>* warnings);
+// The same, also of positions alone: four columns. `has_rotations`: false for these; the rotations
+// are the identity then.
+struct PosesOrPositions {
+  Trajectory trajectory;
+  bool has_rotations = true;
+};
+PosesOrPositions ReadPosesOrPositions(const std::string& path, std::vector<std::string>* warnings);
 
 void WriteTum(const std::string& path, const Trajectory& trajectory);
 
