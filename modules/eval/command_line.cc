@@ -23,13 +23,13 @@ void Warn(const std::vector<std::string>& warnings) {
 }
 
 // Reads a TUM or EuRoC ground-truth file, or a recording's folder.
-Trajectory ReadReference(const std::string& path) {
+PosesOrPositions ReadReference(const std::string& path) {
   std::vector<std::string> warnings;
-  Trajectory reference = std::filesystem::is_directory(path)
-                             ? ReadEurocGroundTruthOf(path, &warnings)
-                             : ReadTrajectory(path, &warnings);
+  PosesOrPositions reference = std::filesystem::is_directory(path)
+                                   ? PosesOrPositions{ReadEurocGroundTruthOf(path, &warnings)}
+                                   : ReadPosesOrPositions(path, &warnings);
   Warn(warnings);
-  if (reference.empty()) {
+  if (reference.trajectory.empty()) {
     throw std::runtime_error(fmt::format("{}: the recording has no ground truth", path));
   }
   return reference;
@@ -88,7 +88,9 @@ CommandLine::CommandLine(CLI::App& app) {
     auto* files = command->add_option(
         "files", files_,
         "ESTIMATE REFERENCE" + std::string(command == joint ? " [ESTIMATE REFERENCE]..." : "") +
-            ": TUM files or EuRoC ground-truth csv; REFERENCE may be a recording's folder");
+            ": TUM files or EuRoC ground-truth csv, for ate and joint also of positions alone "
+            "(stamp x "
+            "y z); REFERENCE may be a recording's folder");
     files->required();
     if (command != joint) {
       files->expected(2);
@@ -128,8 +130,11 @@ std::vector<EvaluationInput> CommandLine::ReadInputs() const {
           fmt::format("{}: is a folder: give ESTIMATE first, then REFERENCE", files_[i]));
     }
     std::vector<std::string> warnings;
+    PosesOrPositions estimate = ReadPosesOrPositions(files_[i], &warnings);
+    PosesOrPositions reference = ReadReference(files_[i + 1]);
     inputs.push_back({std::filesystem::path(files_[i]).filename().string(),
-                      ReadTrajectory(files_[i], &warnings), ReadReference(files_[i + 1])});
+                      std::move(estimate.trajectory), std::move(reference.trajectory),
+                      estimate.has_rotations && reference.has_rotations});
     Warn(warnings);
   }
   return inputs;

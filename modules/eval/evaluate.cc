@@ -26,7 +26,7 @@ ordered_json ToJson(const Statistics& s, double factor) {
 }
 
 std::vector<std::string> Cells(const std::string& alignment, const std::string& name,
-                               const Ate& ate, const std::string& coverage) {
+                               const Ate& ate, bool has_rotations, const std::string& coverage) {
   const Statistics& p = ate.position_m;
   return {alignment,
           name,
@@ -35,7 +35,7 @@ std::vector<std::string> Cells(const std::string& alignment, const std::string& 
           fmt::format("{:.4f}", p.mean),
           fmt::format("{:.4f}", p.median),
           fmt::format("{:.4f}", p.max),
-          fmt::format("{:.3f}", kDegrees * ate.rotation_rad.rmse),
+          has_rotations ? fmt::format("{:.3f}", kDegrees * ate.rotation_rad.rmse) : "-",
           fmt::format("{:.4f}", ate.alignment.scale),
           coverage};
 }
@@ -123,6 +123,7 @@ AbsoluteEvaluation EvaluateAbsolute(const std::vector<EvaluationInput>& inputs, 
   for (const EvaluationInput& input : inputs) {
     evaluation.names.push_back(input.name);
     evaluation.poses.push_back(input.estimate.size());
+    evaluation.has_rotations.push_back(input.has_rotations);
     evaluation.coverage.push_back(Coverage(input.estimate, input.reference));
     pairs.push_back(PairsOf(input, max_gap_s));
   }
@@ -150,6 +151,7 @@ std::string ToText(const AbsoluteEvaluation& evaluation) {
     for (size_t i = 0; i < joint.agents.size(); ++i) {
       const auto& coverage = evaluation.coverage[i];
       table.Add(Cells(ToString(kind), evaluation.names[i], joint.agents[i],
+                      evaluation.has_rotations[i],
                       coverage ? fmt::format("{:.3f}", *coverage) : "-"));
     }
     if (joint.agents.size() > 1) {
@@ -164,6 +166,9 @@ std::string ToText(const AbsoluteEvaluation& evaluation) {
   for (size_t i = 0; i < evaluation.names.size(); ++i) {
     const size_t associated = evaluation.by_alignment.front().second.agents[i].position_m.count;
     text += Associated(evaluation.names[i], associated, evaluation.poses[i]) + "\n";
+    if (!evaluation.has_rotations[i]) {
+      text += fmt::format("{}: positions alone, so no rotation error\n", evaluation.names[i]);
+    }
   }
   return text + table.Text();
 }
@@ -185,7 +190,9 @@ ordered_json ToJson(const AbsoluteEvaluation& evaluation) {
            {"poses", evaluation.poses[i]},
            {"associated", joint.agents[i].position_m.count},
            {"ate_m", ToJson(joint.agents[i].position_m, 1)},
-           {"rotation_deg", ToJson(joint.agents[i].rotation_rad, kDegrees)},
+           {"rotation_deg", evaluation.has_rotations[i]
+                                ? ToJson(joint.agents[i].rotation_rad, kDegrees)
+                                : ordered_json()},
            {"coverage", coverage ? ordered_json(*coverage) : ordered_json()}});
     }
   }
@@ -195,6 +202,12 @@ ordered_json ToJson(const AbsoluteEvaluation& evaluation) {
 RelativeEvaluation EvaluateRelative(const EvaluationInput& input,
                                     const std::vector<double>& distances_m,
                                     const std::vector<double>& durations_s, double max_gap_s) {
+  if (!input.has_rotations) {
+    throw std::runtime_error(
+        fmt::format("{}: it or its reference has positions alone, and a relative error is between "
+                    "poses: give eight columns, or use ate",
+                    input.name));
+  }
   const std::vector<PosePair> pairs = PairsOf(input, max_gap_s);
   RelativeEvaluation evaluation{input.name, input.estimate.size(), pairs.size(), {}, {}};
   for (const double distance_m : distances_m) {

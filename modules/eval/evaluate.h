@@ -17,6 +17,7 @@ struct EvaluationInput {
   std::string name;
   Trajectory estimate;
   Trajectory reference;
+  bool has_rotations = true;  // false: one of the two has positions alone
 };
 
 // Fewer associated poses are taken as a mistake (such as a different clock); their error would be
@@ -27,7 +28,8 @@ inline constexpr double kMinAssociatedShare = 0.05;
 // Absolute error under one alignment for all inputs, by SE(3), yaw and Sim(3).
 struct AbsoluteEvaluation {
   std::vector<std::string> names;
-  std::vector<size_t> poses;  // of each estimate; by_alignment has the associated ones
+  std::vector<size_t> poses;        // of each estimate; by_alignment has the associated ones
+  std::vector<bool> has_rotations;  // without, its rotation error means nothing, and is not written
   std::vector<std::optional<double>> coverage;
   std::vector<std::pair<TrajectoryAlignmentKind, JointAte>> by_alignment;
 };
@@ -48,8 +50,8 @@ struct RelativeEvaluation {
   std::vector<RelativeRow> over_distance_m;
   std::vector<RelativeRow> over_time_s;
 };
-// Throws std::runtime_error if too few poses have ground truth, no part is long enough, or an error
-// is not a number.
+// Throws std::runtime_error if too few poses have ground truth, no part is long enough, an error is
+// not a number, or there are no rotations: a relative error is between poses.
 RelativeEvaluation EvaluateRelative(const EvaluationInput& input,
                                     const std::vector<double>& distances_m,
                                     const std::vector<double>& durations_s, double max_gap_s);

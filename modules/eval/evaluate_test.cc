@@ -48,6 +48,25 @@ TEST(Evaluate, RelativeRowsWithoutAStretchSayNothing) {
   EXPECT_THAT(ToText(evaluation), HasSubstr("| 1000 m | 0"));
 }
 
+TEST(Evaluate, PositionsAloneHaveAnAteAndNoRotationError) {
+  EvaluationInput positions = Input("positions.txt", 0);
+  for (StampedPose& pose : positions.estimate) {
+    pose.T.q.setIdentity();
+  }
+  positions.has_rotations = false;
+  const AbsoluteEvaluation evaluation = EvaluateAbsolute({positions, Input("poses.tum", 0)}, 0.1);
+  const auto json = ToJson(evaluation)["SE(3)"]["trajectories"];
+  EXPECT_LT(json[0]["ate_m"]["max"].get<double>(), 1e-9);
+  EXPECT_TRUE(json[0]["rotation_deg"].is_null());
+  EXPECT_FALSE(json[1]["rotation_deg"].is_null());
+  EXPECT_THAT(ToText(evaluation),
+              AllOf(HasSubstr("positions.txt: positions alone, so no rotation error\n"),
+                    HasSubstr("| 0.0000 | -                 | 1.0000 |")));
+  EXPECT_THAT([&] { EvaluateRelative(positions, {1}, {1}, 0.1); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("positions.txt: it or its reference has "
+                                                          "positions alone")));
+}
+
 TEST(Evaluate, NoCommonTimeIsAnError) {
   EvaluationInput input = Input("late.tum", 0);
   for (StampedPose& pose : input.estimate) {
