@@ -84,11 +84,14 @@ void ExplainResult(Arguments& arguments) {
     std::cout << ListResults(log, &arguments.readings);
     return;
   }
-  std::map<int32_t, std::string> recordings = RecordingsById(arguments.recordings);
+  const std::map<int32_t, std::string> given = RecordingsById(arguments.recordings);
   const Explanation explanation = Explain(log, *arguments.constraint, &arguments.readings);
   std::cout << ToText(explanation);
   if (!arguments.out.empty()) {
-    recordings.merge(RecordingsAtHand(ReadSessionRecord({log})));
+    SessionRecord recordings = ReadSessionRecord({log});
+    for (const auto& [id, folder] : given) {
+      GiveRecording(id, folder, &recordings);
+    }
     WriteExplanationPng(explanation, recordings, arguments.out);
   }
 }

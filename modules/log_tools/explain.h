@@ -3,13 +3,13 @@
 // Explains why a constraint was accepted or refused: repeats the verification with the log's
 // keyframes and candidate, and shows each step, as text and as a picture of both keyframes.
 
-#include <map>
 #include <string>
 #include <vector>
 
 #include "core/server_messages.h"
 #include "log_file/log_reading.h"
 #include "loop_verification/aligner.h"
+#include "report/session_record.h"
 
 namespace pangea {
 
@@ -36,9 +36,9 @@ void CheckConstraintId(const std::vector<std::string>& logs, int64_t constraint_
 
 std::string ToText(const Explanation& explanation);
 // Each row shows the match on the left and the query on the right: the candidate's corners, PnP,
-// and, if it was reached, the window BA; below is the verification result. `recordings`: folders by
-// agent; without one, corners are drawn on a dark background.
-void WriteExplanationPng(const Explanation& explanation,
-                         const std::map<int32_t, std::string>& recordings, const std::string& path);
+// and, if it was reached, the window BA; below is the verification result. `recordings`: of the
+// agents; without one, corners are drawn on a dark background.
+void WriteExplanationPng(const Explanation& explanation, const SessionRecord& recordings,
+                         const std::string& path);
 
 }  // namespace pangea

@@ -18,13 +18,13 @@ constexpr int kCaption_px = 34;
 constexpr int kBetween_px = 4;  // between the two images
 
 // The image nearest to the keyframe in time, in colour; dark if there is none.
-cv::Mat ImageOf(const Keyframe& keyframe, const std::map<int32_t, std::string>& recordings) {
+cv::Mat ImageOf(const Keyframe& keyframe, const SessionRecord& recordings) {
   cv::Mat image(keyframe.camera.height, keyframe.camera.width, CV_8UC3, cv::Scalar(40, 40, 40));
-  const auto folder = recordings.find(keyframe.id.map.agent_id);
-  if (folder == recordings.end()) {
+  const std::optional<std::string> folder = RecordingOf(keyframe.id.map, recordings);
+  if (!folder) {
     return image;
   }
-  const EurocRecording recording(folder->second);
+  const EurocRecording recording(*folder);
   constexpr int64_t kMaxOff_us = 60'000;
   size_t nearest = 0;
   int64_t off = kMaxOff_us;
@@ -128,8 +128,7 @@ std::string ResultOf(const Explanation& explanation) {
 
 }  // namespace
 
-void WriteExplanationPng(const Explanation& explanation,
-                         const std::map<int32_t, std::string>& recordings,
+void WriteExplanationPng(const Explanation& explanation, const SessionRecord& recordings,
                          const std::string& path) {
   if (std::filesystem::path(path).extension() != ".png") {
     throw std::runtime_error(fmt::format("{}: give a name that ends in .png", path));

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <map>
+#include <set>
 #include <stdexcept>
 
 #include "files/text_file.h"
@@ -11,6 +12,7 @@
 #include "messages/channels.h"
 #include "messages/encoding.h"
 #include "messages/messages.h"
+#include "report/metrics/recording_maps.h"
 #include "report/metrics/report_groups.h"
 #include "report/metrics/report_metrics.h"
 #include "report/report_files.h"
@@ -78,15 +80,19 @@ std::vector<std::string> ExportTum(const std::string& log, const std::string& fo
         log));
   }
   std::filesystem::create_directories(folder);
+  const MapSpans spans = SpansOf(groups);
   std::vector<std::string> files;
-  std::map<int32_t, int> of_agent;
+  std::set<int32_t> with_file;
   for (const FinalGroup& group : groups) {
     for (const int32_t agent : group.Agents()) {
       // Groups are sorted by number of agents, so the agent's first group is the largest.
-      const std::string name =
-          of_agent[agent]++ == 0 ? TrajectoryFile(agent) : TrajectoryFile(agent, group.frame);
-      files.push_back(fmt::format("{}/{}", folder, name));
-      WriteTum(files.back(), group.TrajectoryOf(agent));
+      for (const std::set<MapId>& maps : TrajectoriesOf(group, agent, spans)) {
+        const std::string name = with_file.insert(agent).second
+                                     ? TrajectoryFile(agent)
+                                     : TrajectoryFile(agent, *maps.begin());
+        files.push_back(fmt::format("{}/{}", folder, name));
+        WriteTum(files.back(), group.TrajectoryOf(maps));
+      }
     }
   }
   return files;

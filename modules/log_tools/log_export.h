@@ -13,7 +13,8 @@
 namespace pangea {
 
 // Writes the poses of each agent's keyframes in its group's map frame: <folder>/agent_<id>.tum, and
-// another file for each further group of the agent. Returns the files. Throws std::runtime_error if
+// another file for each further group of the agent, and for each map of another recording
+// (recording_maps.h). Returns the files. Throws std::runtime_error if
 // there are none.
 std::vector<std::string> ExportTum(const std::string& log, const std::string& folder,
                                    LogReadings* readings = nullptr);

@@ -34,6 +34,15 @@ std::set<int32_t> Agents(const ordered_json& group) {
   return group.at("agents").get<std::set<int32_t>>();
 }
 
+// The maps of its agents that are of earlier sessions.
+std::set<std::string> EarlierMaps(const ordered_json& report) {
+  std::set<std::string> maps;
+  for (const ordered_json& agent : report.at("agents")) {
+    maps.merge(agent.at("map_ids_not_compared").get<std::set<std::string>>());
+  }
+  return maps;
+}
+
 // Whether one group has maps of all these agents, and perhaps of agents of earlier sessions.
 // `group_of`: by map, "AGENT/OPENED".
 bool Together(const std::map<std::string, size_t>& group_of, const std::set<int32_t>& agents) {
@@ -52,13 +61,16 @@ Values FusedBy(const ordered_json& report) {
   for (const ordered_json& agent : report.at("agents")) {
     all.insert(agent.at("id").get<int32_t>());
   }
+  const std::set<std::string> earlier = EarlierMaps(report);
   std::optional<double> since;
   std::map<std::string, size_t> group_of;
   size_t group = 0;
   for (const ordered_json& change : report.at("fused_at")) {
     ++group;
-    for (const ordered_json& map : change.at("map_ids")) {
-      group_of[map.get<std::string>()] = group;
+    for (const ordered_json& id : change.at("map_ids")) {
+      if (const auto map = id.get<std::string>(); !earlier.contains(map)) {
+        group_of[map] = group;
+      }
     }
     if (!Together(group_of, all)) {
       since.reset();
@@ -82,7 +94,8 @@ Values OfEach(const ordered_json& report, Of of) {
 
 Values Maps(const ordered_json& report) {
   return OfEach(report, [](const ordered_json& agent) {
-    return std::optional(static_cast<double>(agent.at("map_ids").size()));
+    const size_t earlier = agent.at("map_ids_not_compared").size();
+    return std::optional(static_cast<double>(agent.at("map_ids").size() - earlier));
   });
 }
 

@@ -17,8 +17,9 @@ using testing::HasSubstr;
 ordered_json Report() {
   return ordered_json::parse(R"({
     "agents": [
-      {"id": 1, "map_ids": ["1/10"], "coverage": 0.99, "ate_vio_m": 0.04, "ate_server_m": 0.02},
-      {"id": 2, "map_ids": ["2/10", "2/20"], "coverage": 0.7, "ate_vio_m": 0.03, "ate_server_m": null}],
+      {"id": 1, "map_ids": ["1/10"], "map_ids_not_compared": [], "coverage": 0.99, "ate_vio_m": 0.04, "ate_server_m": 0.02},
+      {"id": 2, "map_ids": ["2/10", "2/20"], "map_ids_not_compared": [],
+       "coverage": 0.7, "ate_vio_m": 0.03, "ate_server_m": null}],
     "groups": [{"agents": [1, 2]}],
     "ate_joint_m": 0.05,
     "constraints_truth": {"checked": 12, "wrong": 1},
@@ -77,6 +78,19 @@ TEST(Expectations, AgentsOfEarlierSessionsMayBeInTheGroup) {
   EXPECT_TRUE(Met("fused_by", 30.5, report));
   report["groups"] = {{{"agents", {1, 7}}}, {{"agents", {2}}}};
   EXPECT_FALSE(Met("fused_by", 1000, report));
+}
+
+// The same agent's map of an earlier session does not count for it.
+TEST(Expectations, AnAgentsEarlierMapDoesNotStandForIt) {
+  ordered_json report = Report();
+  ordered_json& first = report["agents"][0];
+  first["map_ids"] = {"1/10", "1/20"};
+  first["map_ids_not_compared"] = {"1/10"};
+  EXPECT_TRUE(Met("maps", 2, report));
+  report["agents"][1]["map_ids_not_compared"] = {"2/10"};
+  EXPECT_TRUE(Met("maps", 1, report));
+  EXPECT_FALSE(Met("fused_by", 40, report)) << "until 40.5 s only the earlier map is in the group";
+  EXPECT_TRUE(Met("fused_by", 40.5, report));
 }
 
 // The report has one change for a split, of either part.

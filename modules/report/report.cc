@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
+#include <set>
 #include <stdexcept>
 
 #include "files/text_file.h"
@@ -32,11 +33,12 @@ void WriteTrajectories(const AgentMetrics& agent, const std::vector<GroupMetrics
   const auto main = agent.odometry.find(agent.main_map);
   write(OdometryFile(agent.id), main == agent.odometry.end() ? Trajectory() : main->second);
   write(TrajectoryFile(agent.id),
-        groups.empty() ? Trajectory() : groups[agent.group].group.TrajectoryOf(agent.id));
-  for (size_t i = 0; i < groups.size(); ++i) {
-    for (const MapId& map : groups[i].group.maps) {
-      if (i != agent.group && map.agent_id == agent.id) {
-        write(TrajectoryFile(agent.id, map), groups[i].group.TrajectoryOf(map));
+        groups.empty() ? Trajectory()
+                       : groups[agent.group].group.TrajectoryOf(agent.trajectory_maps));
+  for (const GroupMetrics& metrics : groups) {
+    for (const MapId& map : metrics.group.maps) {
+      if (map.agent_id == agent.id && agent.trajectory_maps != std::set<MapId>{map}) {
+        write(TrajectoryFile(agent.id, map), metrics.group.TrajectoryOf({map}));
       }
     }
   }
@@ -85,7 +87,11 @@ WrittenReport WriteReport(const ReportInput& input, const std::string& folder,
                 json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n");
   WriteTextFile(folder + "/report.md", markdown);
   WriteTextFile(folder + "/report.html", html);
-  return {std::move(markdown), std::move(checked)};
+  std::vector<AgentRun> runs;
+  for (AgentMetrics& agent : metrics.agents) {
+    runs.push_back(std::move(agent.run));
+  }
+  return {std::move(markdown), std::move(runs), std::move(checked)};
 }
 
 }  // namespace pangea

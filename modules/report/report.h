@@ -6,8 +6,9 @@
 // Writes into `folder` (which must exist), in place of an earlier report's files:
 //   agent_<id>.vio.tum       T_odom_body of the agent's main map, raw odometry at camera rate
 //                            (of its other maps: agent_<id>.<map>.vio.tum)
-//   agent_<id>.tum           T_map_body of its keyframes in the map frame of its main group: the
-//                            group that has most of them (other maps: agent_<id>.<map>.tum)
+//   agent_<id>.tum           T_map_body of the keyframes of its recording, in the map frame of its
+//                            main group: the group that has most of them
+//                            (every map that is not alone in it: agent_<id>.<map>.tum)
 //   map.ply                  points coloured by agent, in the largest group's map frame (other
 //                            groups, whose frames are unrelated to it: map.<map>.ply)
 //   report.json, report.md, report.html
@@ -22,9 +23,11 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
+#include "core/ids.h"
 #include "log_file/log_reading.h"
 #include "report/expectations.h"
 
@@ -44,6 +47,8 @@ struct AgentRun {
   // the part of the recording that was played, seconds since its first image
   double start_s = 0;
   std::optional<double> duration_s;  // empty: to its end
+  // the maps made from it; empty: unknown. A continued journal has maps of earlier recordings too
+  std::optional<std::set<MapId>> maps;
   // log of the agent's bus with POSE_<id> and anchors; without it, the odometry's trajectory is
   // that of its keyframes
   std::string bus_log;
@@ -79,6 +84,7 @@ struct ReportInput {
 
 struct WrittenReport {
   std::string text;                         // of report.md
+  std::vector<AgentRun> runs;               // of the input, with their maps where these are known
   std::vector<CheckedExpectation> checked;  // one per expectation of the input
 };
 

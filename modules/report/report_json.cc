@@ -50,6 +50,13 @@ ordered_json MapIds(const std::vector<MapId>& maps) {
   return ids;
 }
 
+// The maps that were not made from its recording.
+std::vector<MapId> NotCompared(const AgentMetrics& agent) {
+  std::vector<MapId> maps = agent.maps;
+  std::erase_if(maps, [&agent](const MapId& map) { return agent.recording_maps.contains(map); });
+  return maps;
+}
+
 ordered_json LinkJson(const AgentRun& run) {
   if (!run.link) {
     return {};
@@ -63,6 +70,7 @@ ordered_json AgentJson(const AgentMetrics& agent) {
   const AgentRun& run = agent.run;
   return {{"id", agent.id},
           {"map_ids", MapIds(agent.maps)},
+          {"map_ids_not_compared", MapIds(NotCompared(agent))},
           {"keyframes", agent.keyframes},
           {"initialised_s", Number(agent.initialised_s)},
           {"path_m", Number(agent.path_m)},
@@ -89,8 +97,8 @@ ordered_json ChangeJson(const GroupChange& change, const ReportMetrics& metrics)
   json["agents"] = FinalGroup{{}, change.maps, {}, 0}.Agents();
   json["map_ids"] = MapIds(change.maps);
   json["recording_s"] = ordered_json::object();
-  for (const auto& [agent, utime] : change.newest_utime) {
-    json["recording_s"][fmt::format("{}", agent)] = Number(RecordingSeconds(metrics, agent, utime));
+  for (const auto& [agent, seconds] : RecordingSeconds(metrics, change)) {
+    json["recording_s"][fmt::format("{}", agent)] = Number(seconds);
   }
   return json;
 }

@@ -56,7 +56,7 @@ class States {
     if (regrouping.fused || regrouping.split) {
       GroupChange change{regrouping.fused, session_s, state.revision, state.group, state.maps, {}};
       for (const KeyframePose& pose : state.keyframes) {
-        auto& utime = change.newest_utime[pose.id.map.agent_id];
+        auto& utime = change.newest_utime[pose.id.map];
         utime = std::max(utime, pose.utime);
       }
       session_->changes.push_back(std::move(change));
@@ -84,10 +84,18 @@ void AddPose(Bytes data, PoseTrack* track) {
   }
   auto& first = track->first_tracking_utime;
   first = std::min(first.value_or(message.utime), message.utime);
+  track->maps.insert(*map.value);
   track->odometry[*map.value].push_back({message.utime, *T_odom_body.value});
   if (const auto T_map_body = Parse(message.T_map_body); T_map_body.value) {
     track->live.push_back({message.utime, *map.value, *map.value, message.group_revision,
                            *T_odom_body.value, *T_map_body.value});
+  }
+}
+
+void AddMap(Bytes data, PoseTrack* track) {
+  KeyframeMessage message;
+  if (const auto id = DecodeMessage(data, &message) ? Parse(message.id).value : std::nullopt) {
+    track->maps.insert(id->map);
   }
 }
 
@@ -225,11 +233,14 @@ PoseTrack ReadPoses(const std::string& path, int32_t agent_id, LogReadings* read
   Frames frames;
   AnchorTrackReader anchors(agent_id);
   const std::string poses = channels::Pose(agent_id);
+  const std::string keyframes = channels::Keyframe(agent_id);
   const std::string corrections = channels::Correction(agent_id);
   const auto add = [&](const LogEvent& event) {
     anchors.Add(event);
     if (event.channel == poses) {
       AddPose(event.data, &track);
+    } else if (event.channel == keyframes) {
+      AddMap(event.data, &track);
     } else if (event.channel == corrections) {
       AddFrame(event.data, &frames);
     } else if (event.channel.starts_with(channels::kStatusPrefix)) {

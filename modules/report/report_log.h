@@ -56,6 +56,7 @@ using ProcessSamples = std::map<std::string, std::vector<ProcessSample>>;  // by
 struct PoseTrack {
   std::optional<int64_t> first_utime;  // first pose message, whatever its state
   std::optional<int64_t> first_tracking_utime;
+  std::set<MapId> maps;                  // of its poses and keyframes
   std::map<MapId, Trajectory> odometry;  // T_odom_body while tracking
   std::vector<LivePose> live;            // while tracking, ascending in time
   AnchorTrack anchors;
@@ -64,12 +65,12 @@ struct PoseTrack {
 
 // A change of groups, in the order of the log.
 struct GroupChange {
-  bool fused = true;                        // false: a group was split
-  double session_s = 0;                     // since the log's first event
-  int64_t revision = 0;                     // of the state with the change
-  MapId frame;                              // the map whose odom frame is the group's
-  std::vector<MapId> maps;                  // the group after it
-  std::map<int32_t, int64_t> newest_utime;  // by agent: of its keyframes in the group
+  bool fused = true;                      // false: a group was split
+  double session_s = 0;                   // since the log's first event
+  int64_t revision = 0;                   // of the state with the change
+  MapId frame;                            // the map whose odom frame is the group's
+  std::vector<MapId> maps;                // the group after it
+  std::map<MapId, int64_t> newest_utime;  // by map: of its keyframes in the group
 };
 
 // Messages that did not decode, or whose values are refused.
@@ -99,8 +100,8 @@ struct CapturedSession {
 // Reads KEYFRAME_*, CONSTRAINT, MAP_STATE, ANCHOR_EDIT, STATUS_* of a server bus' log. Damaged
 // parts of the log are reported in `readings` (log_reader.h), here and below.
 CapturedSession ReadServerLog(const std::string& path, LogReadings* readings = nullptr);
-// Reads POSE_<agent_id>, CORRECTION_<agent_id>, STATUS_* and the messages for AnchorTrack of an
-// agent bus' log.
+// Reads POSE_<agent_id>, KEYFRAME_<agent_id>, CORRECTION_<agent_id>, STATUS_* and the messages for
+// AnchorTrack of an agent bus' log.
 PoseTrack ReadPoses(const std::string& path, int32_t agent_id, LogReadings* readings = nullptr);
 
 }  // namespace pangea

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <set>
 
 #include "core/keyframe.h"
 #include "eval/evaluate.h"
@@ -65,18 +66,31 @@ void AddGroup(const ReportMetrics& metrics, const GroupMetrics& group, Plot* plo
       group.joint ? group.joint->alignment : TrajectoryAlignment();
   for (const int32_t agent_id : group.group.Agents()) {
     const size_t index = metrics.IndexOf(agent_id);
-    const Trajectory keyframes = group.group.TrajectoryOf(agent_id);
+    // An agent of an earlier session may be in the group and not in the log.
+    const std::set<MapId> of_recording =
+        index < metrics.agents.size() ? metrics.agents[index].recording_maps : std::set<MapId>();
     std::string label = fmt::format("agent {}", agent_id);
     const auto with_truth = std::ranges::find(group.joint_agents, agent_id);
     if (group.joint && with_truth != group.joint_agents.end()) {
       const auto i = static_cast<size_t>(with_truth - group.joint_agents.begin());
       label += fmt::format(" ({:.3f} m)", group.joint->agents[i].position_m.rmse);
     }
-    plot->lines.push_back({.label = label,
-                           .colour = AgentColour(index),
-                           .width = 2.5,
-                           .points = TopView(keyframes, alignment),
-                           .mark_start = true});
+    const auto add = [&](const std::string& text, const std::set<MapId>& maps, double width) {
+      std::vector<Eigen::Vector2d> points = TopView(group.group.TrajectoryOf(maps), alignment);
+      if (!points.empty()) {
+        plot->lines.push_back({.label = text,
+                               .colour = AgentColour(index),
+                               .width = width,
+                               .points = std::move(points),
+                               .mark_start = true});
+      }
+    };
+    add(label, of_recording, 2.5);
+    for (const MapId& map : group.group.maps) {
+      if (map.agent_id == agent_id && !of_recording.contains(map)) {
+        add(fmt::format("agent {}, map {}", agent_id, ToString(map)), {map}, 1.5);
+      }
+    }
   }
 }
 

@@ -190,9 +190,9 @@ std::vector<std::string> ChangeLines(const CapturedSession& session, const Repor
   std::vector<std::string> lines;
   for (const GroupChange& change : session.changes) {
     std::string times;
-    for (const auto& [agent, utime] : change.newest_utime) {
+    for (const auto& [agent, seconds] : RecordingSeconds(metrics, change)) {
       times += fmt::format("{}agent {} at {:.1f} s of its recording", times.empty() ? "" : ", ",
-                           agent, RecordingSeconds(metrics, agent, utime));
+                           agent, seconds);
     }
     lines.push_back(fmt::format("{:.1f} s: {} {} ({})", change.session_s,
                                 change.fused ? "fused into one group:" : "taken apart, leaving",

@@ -116,7 +116,7 @@ void ReportWorld::WriteAgentLog(int32_t agent) const {
   }
 }
 
-Keyframe ReportWorld::MakeKeyframe(const MapId& map, int seq, double s) {
+Keyframe ReportWorld::MakeKeyframe(const MapId& map, int seq, double s, int32_t walk) {
   Keyframe keyframe;
   keyframe.id = {map, seq};
   keyframe.utime = Utime(s);
@@ -124,7 +124,7 @@ Keyframe ReportWorld::MakeKeyframe(const MapId& map, int seq, double s) {
   keyframe.camera.height = 100;
   keyframe.camera.fx = keyframe.camera.fy = 100;
   keyframe.camera.cx = keyframe.camera.cy = 50;
-  keyframe.T_odom_body = Odometry(map.agent_id, s);
+  keyframe.T_odom_body = Odometry(walk, s);
   // A landmark that every keyframe sees straight ahead at 2 m, one seen only by it, an uncertain
   // one.
   for (const int32_t landmark : {0, 1 + seq, 10'000 + seq}) {
@@ -138,10 +138,11 @@ Keyframe ReportWorld::MakeKeyframe(const MapId& map, int seq, double s) {
   return keyframe;
 }
 
-void ReportWorld::LogKeyframes(const MapId& map, int begin, int end) {
+void ReportWorld::LogKeyframes(const MapId& map, int begin, int end, int32_t walk) {
   for (int seq = begin; seq < end; ++seq) {
-    log_->Write(channels::Keyframe(map.agent_id),
-                ToMessage(MakeKeyframe(map, seq - begin, Seconds(seq))));
+    log_->Write(
+        channels::Keyframe(map.agent_id),
+        ToMessage(MakeKeyframe(map, seq - begin, Seconds(seq), walk == 0 ? map.agent_id : walk)));
   }
 }
 

@@ -64,7 +64,8 @@ class ReportWorld : public ::testing::Test {
   static int NumKeyframes() { return static_cast<int>((kDuration - kInit) / kKeyframePeriod) + 1; }
   static double Seconds(int seq) { return kInit + kKeyframePeriod * seq; }
 
-  void LogKeyframes(const MapId& map, int begin, int end);
+  // `walk`: the agent that walked so; 0: the map's own.
+  void LogKeyframes(const MapId& map, int begin, int end, int32_t walk = 0);
   void LogBoth();
   // True poses in the odom frame of the first map's agent, except for a shift of agent 2's.
   static MapState State(int64_t revision, const std::vector<MapId>& maps, int num_keyframes,
@@ -86,7 +87,7 @@ class ReportWorld : public ::testing::Test {
  private:
   void WriteRecording(int32_t agent) const;
   void WriteAgentLog(int32_t agent) const;
-  static Keyframe MakeKeyframe(const MapId& map, int seq, double s);
+  static Keyframe MakeKeyframe(const MapId& map, int seq, double s, int32_t walk);
 };
 
 }  // namespace pangea

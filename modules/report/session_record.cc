@@ -26,6 +26,12 @@ AgentRun RunOf(const json& agent) {
   if (duration_s > 0) {
     run.duration_s = duration_s;
   }
+  if (agent.contains("maps")) {
+    run.maps.emplace();
+    for (const int64_t opened_utime : agent.at("maps")) {
+      run.maps->insert({run.id, opened_utime});
+    }
+  }
   return run;
 }
 
@@ -40,6 +46,12 @@ void Write(const SessionRecord& session, const fs::path& file) {
                       {"recording", recording},
                       {"start", agent.start_s},
                       {"duration", agent.duration_s.value_or(0)}});  // 0: to its end
+    if (agent.maps) {                                                // by opened utime
+      json& maps = agents.back()["maps"] = json::array();
+      for (const MapId& map : *agent.maps) {
+        maps.push_back(map.opened_utime);
+      }
+    }
   }
   json anchors = json::array();
   for (const WantedAnchor& anchor : session.anchors) {
@@ -59,9 +71,11 @@ void WriteSessionRecord(const SessionRecord& session, const fs::path& folder) {
 
 void KeepRecordings(const std::vector<fs::path>& logs, const fs::path& out) {
   SessionRecord kept;
-  std::set<int32_t> ids;
   for (const AgentRun& agent : ReadSessionRecord(logs).agents) {
-    if (ids.insert(agent.id).second) {
+    const bool is_kept = std::ranges::any_of(kept.agents, [&agent](const AgentRun& other) {
+      return other.id == agent.id && other.recording == agent.recording && other.maps == agent.maps;
+    });
+    if (!is_kept) {
       kept.agents.push_back(agent);
     }
   }
@@ -111,14 +125,14 @@ void GiveRecording(int32_t agent_id, const std::string& folder, SessionRecord* s
   }
 }
 
-std::map<int32_t, std::string> RecordingsAtHand(const SessionRecord& session) {
-  std::map<int32_t, std::string> folders;
+std::optional<std::string> RecordingOf(const MapId& map, const SessionRecord& session) {
   for (const AgentRun& agent : session.agents) {
-    if (!agent.recording.empty() && Exists(agent.recording)) {
-      folders.emplace(agent.id, agent.recording);
+    if (agent.id == map.agent_id && (!agent.maps || agent.maps->contains(map)) &&
+        !agent.recording.empty() && Exists(agent.recording)) {
+      return agent.recording;
     }
   }
-  return folders;
+  return std::nullopt;
 }
 
 }  // namespace pangea

@@ -6,17 +6,18 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "core/ids.h"
 #include "report/expectations.h"
 #include "report/report.h"
 
 namespace pangea {
 
 struct SessionRecord {
-  std::vector<AgentRun> agents;  // only id, recording and the part that was played
+  std::vector<AgentRun> agents;  // only id, recording, the part that was played, and its maps
   Expectations expect;
   std::vector<WantedAnchor> anchors;
 };
@@ -35,7 +36,7 @@ void KeepRecordings(const std::vector<std::filesystem::path>& logs,
 // Sets the folder of an agent's recording; the part that was played stays as it is known.
 void GiveRecording(int32_t agent_id, const std::string& folder, SessionRecord* session);
 
-// Folders, by agent, of the recordings that still exist.
-std::map<int32_t, std::string> RecordingsAtHand(const SessionRecord& session);
+// The folder of the recording of which the map is, if it is known and still exists.
+std::optional<std::string> RecordingOf(const MapId& map, const SessionRecord& session);
 
 }  // namespace pangea

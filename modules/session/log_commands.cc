@@ -146,7 +146,7 @@ void ExplainInto(const fs::path& out, int64_t constraint, const SessionRecord& k
                  LogReadings* readings) {
   const Explanation explanation = Explain(out / "session.lcm", constraint, readings);
   const fs::path picture = out / fmt::format("constraint_{}.png", constraint);
-  WriteExplanationPng(explanation, RecordingsAtHand(known), picture);
+  WriteExplanationPng(explanation, known, picture);
   std::cout << fmt::format("{}{}\n", ToText(explanation), picture.string());
 }
 

@@ -74,10 +74,18 @@ std::vector<WantedAnchor> WantedAnchors(const SessionScript& script) {
   return wanted;
 }
 
+SessionRecord RecordOf(const SessionScript& script) {
+  SessionRecord session{{}, script.expect, WantedAnchors(script)};
+  for (const AgentScript& agent : script.agents) {
+    session.agents.push_back(RunOf(agent));
+  }
+  return session;
+}
+
 // Writes the report; returns its text and the expectations that were not met.
 ReportOutcome OutcomeOf(const ReportInput& input, const fs::path& out, LogReadings* readings) {
   WrittenReport report = WriteReport(input, out.string(), readings);
-  ReportOutcome outcome{std::move(report.text), {}};
+  ReportOutcome outcome{std::move(report.text), {}, std::move(report.runs)};
   for (const CheckedExpectation& one : report.checked) {
     if (!one.met) {
       outcome.missed.push_back(
@@ -148,7 +156,13 @@ ReportOutcome ReportRun(const SessionScript& script, const RunSummary& summary, 
   input.anchors = WantedAnchors(script);
   input.expect = script.expect;
   NoteOptions(input.server_log, readings, &input);
-  return OutcomeOf(input, out, readings);
+  ReportOutcome outcome = OutcomeOf(input, out, readings);
+  SessionRecord record = RecordOf(script);
+  for (AgentRun& agent : record.agents) {
+    agent.maps = std::ranges::find(outcome.runs, agent.id, &AgentRun::id)->maps;
+  }
+  WriteSessionRecord(record, out);
+  return outcome;
 }
 
 ReportOutcome ReportLog(const fs::path& log, const SessionRecord& known, const fs::path& out,
@@ -176,11 +190,7 @@ int PrintReport(const ReportOutcome& outcome) {
 }
 
 void WriteRecordings(const SessionScript& script, const fs::path& out) {
-  SessionRecord session{{}, script.expect, WantedAnchors(script)};
-  for (const AgentScript& agent : script.agents) {
-    session.agents.push_back(RunOf(agent));
-  }
-  WriteSessionRecord(session, out);
+  WriteSessionRecord(RecordOf(script), out);
 }
 
 }  // namespace pangea::session

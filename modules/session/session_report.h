@@ -17,9 +17,11 @@ namespace pangea::session {
 struct ReportOutcome {
   std::string text;                 // contents of report.md
   std::vector<std::string> missed;  // one line per expectation that was not met
+  std::vector<AgentRun> runs;       // with the maps that each agent made, where known
 };
 
-// Writes the report of a live run into `out`. `readings`: as in WriteReport, here and below.
+// Writes the report of a live run into `out`, and the agents' maps into the session's record, for
+// reports of its logs. `readings`: as in WriteReport, here and below.
 ReportOutcome ReportRun(const SessionScript& script, const RunSummary& summary,
                         const std::filesystem::path& out, LogReadings* readings);
 

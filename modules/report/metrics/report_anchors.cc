@@ -150,6 +150,9 @@ class Evaluation {
       return fmt::format("agent {} has no ground truth", agent);
     }
     const AnchorViewer& viewer = *maker->second;
+    if (!viewer.recording_maps->contains(placing->map)) {
+      return fmt::format("agent {} placed it in a map of another recording", agent);
+    }
     const std::optional<HeardAnchor> heard = FirstHeard(viewer, id, until, *placing);
     if (!heard) {
       return fmt::format("agent {} has not heard where it is", agent);

@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -68,6 +69,7 @@ struct AnchorViewer {
   const AnchorTrack* track = nullptr;
   const std::map<MapId, Trajectory>* odometry = nullptr;  // T_odom_body
   const Trajectory* ground_truth = nullptr;
+  const std::set<MapId>* recording_maps = nullptr;  // those with this ground truth
 };
 
 // Metrics of all anchors, ascending by id; last come those of `wanted` that were never requested.

@@ -42,6 +42,7 @@ struct World {
   std::map<int32_t, AnchorTrack> tracks;
   std::map<int32_t, std::map<MapId, Trajectory>> odometry;
   std::map<int32_t, Trajectory> ground_truth;
+  std::map<int32_t, std::set<MapId>> recording_maps;
 
   World() {
     session.begin_utime = kWall;
@@ -53,6 +54,7 @@ struct World {
     camera.cy = 480;
     for (const int32_t agent : {1, 2, 3}) {
       tracks[agent];
+      recording_maps[agent] = {kMaps[agent]};
       session.cameras[agent] = camera;
       for (int i = 0; i <= 4000; ++i) {
         ground_truth[agent].push_back({Sensor(0.01 * i), Walk(agent, 0.01 * i)});
@@ -114,7 +116,8 @@ struct World {
   std::vector<AnchorMetrics> All(const std::vector<WantedAnchor>& wanted = {}) const {
     std::vector<AnchorViewer> viewers;
     for (const auto& [agent, track] : tracks) {
-      viewers.push_back({agent, &track, &odometry.at(agent), &ground_truth.at(agent)});
+      viewers.push_back(
+          {agent, &track, &odometry.at(agent), &ground_truth.at(agent), &recording_maps.at(agent)});
     }
     return AnchorsOf(session, viewers, wanted);
   }
@@ -290,6 +293,9 @@ TEST(ReportAnchors, WhatIsNotKnownHasAReason) {
   World deaf = shown;
   deaf.tracks[1].heard.clear();
   EXPECT_EQ(deaf.AtSecond().reason, "agent 1 has not heard where it is");
+  World other = shown;
+  other.recording_maps[1] = {{1, 99}};
+  EXPECT_EQ(other.AtSecond().reason, "agent 1 placed it in a map of another recording");
   World blind = shown;
   blind.odometry[1].clear();
   EXPECT_EQ(blind.AtSecond().reason, "agent 1 has no pose at its placing");

@@ -10,11 +10,11 @@ struct Span {
   int64_t begin = 0, end = 0;
 };
 
-// Time from the odometry's first pose to its last, sensor clock.
+// Time from the odometry's first pose in the recording to its last, sensor clock.
 std::optional<Span> OdometrySpan(const AgentMetrics& agent) {
   std::optional<Span> span;
   for (const auto& [map, odometry] : agent.odometry) {
-    if (!odometry.empty()) {
+    if (!odometry.empty() && agent.recording_maps.contains(map)) {
       const Span of_map{odometry.front().utime, odometry.back().utime};
       span = span ? Span{std::min(span->begin, of_map.begin), std::max(span->end, of_map.end)}
                   : of_map;
@@ -73,6 +73,23 @@ std::optional<double> KilobytesPerSecondUp(const AgentMetrics& agent) {
     return std::nullopt;
   }
   return 1e-3 * static_cast<double>(*agent.run.bytes_up) / *seconds;
+}
+
+std::map<int32_t, double> RecordingSeconds(const ReportMetrics& metrics,
+                                           const GroupChange& change) {
+  std::map<int32_t, int64_t> newest;
+  for (const auto& [map, utime] : change.newest_utime) {
+    const size_t agent = metrics.IndexOf(map.agent_id);
+    if (agent < metrics.agents.size() && metrics.agents[agent].recording_maps.contains(map)) {
+      int64_t& of_agent = newest.try_emplace(map.agent_id, utime).first->second;
+      of_agent = std::max(of_agent, utime);
+    }
+  }
+  std::map<int32_t, double> seconds;
+  for (const auto& [agent, utime] : newest) {
+    seconds[agent] = RecordingSeconds(metrics, agent, utime);
+  }
+  return seconds;
 }
 
 double RecordingSeconds(const ReportMetrics& metrics, int32_t agent_id, int64_t utime) {

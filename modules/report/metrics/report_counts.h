@@ -27,5 +27,8 @@ std::optional<double> KilobytesPerSecondUp(const AgentMetrics& agent);
 
 // Time in an agent's recording, seconds since its first image.
 double RecordingSeconds(const ReportMetrics& metrics, int32_t agent_id, int64_t utime);
+// The same by agent, of its newest keyframe in the group that changed; only agents with a map of
+// their recording in it.
+std::map<int32_t, double> RecordingSeconds(const ReportMetrics& metrics, const GroupChange& change);
 
 }  // namespace pangea

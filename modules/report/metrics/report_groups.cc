@@ -54,18 +54,6 @@ FinalGroup Solved(const CapturedSession& session, const MapState& state, std::ve
   return {state.group, std::move(maps), Values(poses), state.num_switched_off};
 }
 
-template <typename Wanted>
-Trajectory TrajectoryOfThose(const std::vector<FinalKeyframe>& keyframes, Wanted wanted) {
-  Trajectory trajectory;
-  for (const FinalKeyframe& keyframe : keyframes) {
-    if (wanted(keyframe.id.map)) {
-      trajectory.push_back({keyframe.utime, keyframe.T_map_body});
-    }
-  }
-  SortByTime(&trajectory);
-  return trajectory;
-}
-
 FinalGroup Alone(const CapturedSession& session, const MapId& map) {
   Poses poses;
   for (auto it = session.keyframes.lower_bound({map, 0});
@@ -90,12 +78,20 @@ size_t FinalGroup::CountOf(int32_t agent_id) const {
       keyframes, agent_id, [](const FinalKeyframe& k) { return k.id.map.agent_id; }));
 }
 
-Trajectory FinalGroup::TrajectoryOf(int32_t agent_id) const {
-  return TrajectoryOfThose(keyframes, [&](const MapId& of) { return of.agent_id == agent_id; });
+size_t FinalGroup::CountOf(const std::set<MapId>& maps) const {
+  return static_cast<size_t>(std::ranges::count_if(
+      keyframes, [&maps](const FinalKeyframe& k) { return maps.contains(k.id.map); }));
 }
 
-Trajectory FinalGroup::TrajectoryOf(const MapId& map) const {
-  return TrajectoryOfThose(keyframes, [&](const MapId& of) { return of == map; });
+Trajectory FinalGroup::TrajectoryOf(const std::set<MapId>& maps) const {
+  Trajectory trajectory;
+  for (const FinalKeyframe& keyframe : keyframes) {
+    if (maps.contains(keyframe.id.map)) {
+      trajectory.push_back({keyframe.utime, keyframe.T_map_body});
+    }
+  }
+  SortByTime(&trajectory);
+  return trajectory;
 }
 
 std::vector<FinalGroup> FinalGroups(const CapturedSession& session) {

@@ -2,6 +2,7 @@
 
 // The result of a session: the groups of maps, and the pose of each keyframe in its group's frame.
 
+#include <set>
 #include <vector>
 
 #include "report/report_log.h"
@@ -20,11 +21,13 @@ struct FinalGroup {
   std::vector<FinalKeyframe> keyframes;  // ascending by id
   int num_switched_off = 0;              // constraints that the robust solve switched off
 
-  std::vector<int32_t> Agents() const;     // ascending, each once
-  size_t CountOf(int32_t agent_id) const;  // keyframes of that agent
-  // Trajectory of one agent's keyframes, or of one map.
-  Trajectory TrajectoryOf(int32_t agent_id) const;
-  Trajectory TrajectoryOf(const MapId& map) const;
+  std::vector<int32_t> Agents() const;  // ascending, each once
+  // Number of keyframes of an agent, or of these maps.
+  size_t CountOf(int32_t agent_id) const;
+  size_t CountOf(const std::set<MapId>& maps) const;
+  // The trajectory of these maps' keyframes. They must be of one recording: the clocks of two may
+  // overlap.
+  Trajectory TrajectoryOf(const std::set<MapId>& maps) const;
 };
 
 // Each map belongs to the newest state that mentions it. Keyframes missing in that state are placed

@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <iterator>
 #include <set>
 #include <stdexcept>
 
 #include "recording/euroc.h"
+#include "report/metrics/recording_maps.h"
 
 namespace pangea {
 namespace {
@@ -75,22 +77,43 @@ std::map<MapId, int64_t> FusedRevisions(const CapturedSession& session) {
   return revisions;
 }
 
-void ReadOdometry(const AgentRun& run, const CapturedSession& session, AgentMetrics* agent,
+// All maps of the agent, also those of earlier sessions.
+std::set<MapId> MapsOf(const AgentMetrics& agent, const MapSpans& spans) {
+  std::set<MapId> maps;
+  for (const auto& [map, odometry] : agent.odometry) {
+    maps.insert(map);
+  }
+  for (const auto& [map, span] : spans) {
+    if (map.agent_id == agent.id) {
+      maps.insert(map);
+    }
+  }
+  return maps;
+}
+
+void ReadOdometry(const CapturedSession& session, const MapSpans& spans, AgentMetrics* agent,
                   std::vector<std::string>* notes, LogReadings* readings) {
+  AgentRun& run = agent->run;
   PoseTrack track;
   if (!run.bus_log.empty() && std::filesystem::exists(run.bus_log)) {
     track = ReadPoses(run.bus_log, run.id, readings);
+    run.maps = std::move(track.maps);  // nothing else publishes on the agent's bus
   }
   agent->odometry = std::move(track.odometry);
   agent->samples = std::move(track.samples);
   agent->anchors = std::move(track.anchors);
   agent->live = LiveMetricsOf(track.live, FusedRevisions(session), agent->ground_truth);
   agent->odometry_at_camera_rate = !agent->odometry.empty();
+  const std::set<MapId> maps = MapsOf(*agent, spans);
+  agent->maps.assign(maps.begin(), maps.end());
+  agent->recording_maps = MapsOfRecording(run, maps, spans, notes);
   std::optional<int64_t> first_pose = track.first_tracking_utime;
   if (!agent->odometry_at_camera_rate) {
     for (const auto& [id, keyframe] : session.keyframes) {
       if (id.map.agent_id == run.id) {
         agent->odometry[id.map].push_back({keyframe.utime, keyframe.T_odom_body});
+      }
+      if (agent->recording_maps.contains(id.map)) {
         first_pose = std::min(first_pose.value_or(keyframe.utime), keyframe.utime);
       }
     }
@@ -102,7 +125,7 @@ void ReadOdometry(const AgentRun& run, const CapturedSession& session, AgentMetr
         run.id));
   }
   for (const auto& [map, odometry] : agent->odometry) {
-    agent->path_m += PathLength(odometry);
+    agent->path_m += agent->recording_maps.contains(map) ? PathLength(odometry) : 0;
   }
   const auto from = PlayedFrom(run);
   const auto begin = from ? from : track.first_utime;
@@ -111,38 +134,37 @@ void ReadOdometry(const AgentRun& run, const CapturedSession& session, AgentMetr
   }
 }
 
-void ChooseMain(const std::vector<GroupMetrics>& groups, const CapturedSession& session,
-                AgentMetrics* agent) {
+// Main group and main map are chosen among the maps of the recording; if none of them is in the
+// log, among all.
+void ChooseMain(const std::vector<GroupMetrics>& groups, AgentMetrics* agent) {
+  const std::set<MapId> all(agent->maps.begin(), agent->maps.end());
+  const std::set<MapId>& maps = agent->recording_maps.empty() ? all : agent->recording_maps;
   size_t most = 0;
   for (size_t i = 0; i < groups.size(); ++i) {
-    const size_t count = groups[i].group.CountOf(agent->id);
+    const size_t count = groups[i].group.CountOf(maps);
     if (count > most) {
       most = count;
       agent->group = i;
     }
-    agent->keyframes += count;
+    agent->keyframes += groups[i].group.CountOf(agent->id);
   }
-  std::set<MapId> maps;
-  for (const auto& [map, odometry] : agent->odometry) {
-    maps.insert(map);
+  if (most == 0) {  // no keyframe arrived
+    agent->main_map = maps.empty() ? MapId() : *maps.begin();
+    return;
   }
-  for (const auto& [id, keyframe] : session.keyframes) {
-    if (id.map.agent_id == agent->id) {
-      maps.insert(id.map);
-    }
-  }
-  agent->maps.assign(maps.begin(), maps.end());
+  const FinalGroup& group = groups[agent->group].group;
   size_t longest = 0;
-  for (size_t i = 0; most > 0 && i < agent->maps.size(); ++i) {
-    const size_t length = groups[agent->group].group.TrajectoryOf(agent->maps[i]).size();
+  for (const MapId& map : maps) {
+    const size_t length = group.CountOf(std::set<MapId>{map});
     if (length > longest) {
       longest = length;
-      agent->main_map = agent->maps[i];
+      agent->main_map = map;
     }
   }
-  if (most == 0 && !agent->maps.empty()) {  // no keyframe arrived
-    agent->main_map = agent->maps.front();
-  }
+  std::ranges::set_intersection(
+      agent->recording_maps, group.maps,
+      std::inserter(agent->trajectory_maps, agent->trajectory_maps.end()));
+  agent->trajectory_maps.insert(agent->main_map);
 }
 
 // The sum of a count over all starts of its process, each of which counts from zero.
@@ -170,38 +192,40 @@ void CountBytes(AgentMetrics* agent) {
 }
 
 AgentMetrics MetricsOf(const AgentRun& run, const CapturedSession& session,
-                       const std::vector<GroupMetrics>& groups, std::vector<std::string>* notes,
-                       LogReadings* readings) {
+                       const std::vector<GroupMetrics>& groups, const MapSpans& spans,
+                       std::vector<std::string>* notes, LogReadings* readings) {
   AgentMetrics agent;
   agent.id = run.id;
   agent.run = run;
   ReadGroundTruth(run, &agent, notes);
-  ReadOdometry(run, session, &agent, notes, readings);
+  ReadOdometry(session, spans, &agent, notes, readings);
   CountBytes(&agent);
-  ChooseMain(groups, session, &agent);
-  const Trajectory keyframes =
-      groups.empty() ? Trajectory() : groups[agent.group].group.TrajectoryOf(agent.id);
-  if (!agent.ground_truth.empty()) {
-    const Trajectory& odometry = agent.odometry[agent.main_map];
-    const std::vector<PosePair> pairs = Associate(odometry, agent.ground_truth);
-    if (!odometry.empty() && pairs.size() < kMinPairs) {
-      notes->push_back(fmt::format(
-          "agent {}: {} of its {} poses have ground truth at their time, so no error; between two "
-          "of its poses more than {:g} s apart ground truth is not used",
-          run.id, pairs.size(), odometry.size(), 1e-6 * kMaxGroundTruthGapUs));
-    }
-    agent.vio = AbsoluteError(pairs, TrajectoryAlignmentKind::kSe3);
-    agent.server =
-        AbsoluteError(Associate(keyframes, agent.ground_truth), TrajectoryAlignmentKind::kSe3);
-    agent.coverage = Coverage(keyframes, agent.ground_truth);
+  ChooseMain(groups, &agent);
+  if (agent.ground_truth.empty() || agent.recording_maps.empty()) {
+    return agent;
   }
+  const Trajectory keyframes =
+      groups.empty() ? Trajectory() : groups[agent.group].group.TrajectoryOf(agent.recording_maps);
+  const Trajectory& odometry = agent.odometry[agent.main_map];
+  const std::vector<PosePair> pairs = Associate(odometry, agent.ground_truth);
+  if (!odometry.empty() && pairs.size() < kMinPairs) {
+    notes->push_back(fmt::format(
+        "agent {}: {} of its {} poses have ground truth at their time, so no error; between two "
+        "of its poses more than {:g} s apart ground truth is not used",
+        run.id, pairs.size(), odometry.size(), 1e-6 * kMaxGroundTruthGapUs));
+  }
+  agent.vio = AbsoluteError(pairs, TrajectoryAlignmentKind::kSe3);
+  agent.server =
+      AbsoluteError(Associate(keyframes, agent.ground_truth), TrajectoryAlignmentKind::kSe3);
+  agent.coverage = Coverage(keyframes, agent.ground_truth);
   return agent;
 }
 
 void AddJoint(const std::vector<AgentMetrics>& agents, GroupMetrics* metrics) {
   std::vector<std::vector<PosePair>> pairs;
   for (const AgentMetrics& agent : agents) {
-    auto with_truth = Associate(metrics->group.TrajectoryOf(agent.id), agent.ground_truth);
+    auto with_truth =
+        Associate(metrics->group.TrajectoryOf(agent.recording_maps), agent.ground_truth);
     if (!with_truth.empty()) {
       pairs.push_back(std::move(with_truth));
       metrics->joint_agents.push_back(agent.id);
@@ -211,9 +235,11 @@ void AddJoint(const std::vector<AgentMetrics>& agents, GroupMetrics* metrics) {
 }
 
 void AddConstraints(const CapturedSession& session, ReportMetrics* metrics) {
-  std::map<int32_t, Trajectory> ground_truth;
+  std::map<MapId, const Trajectory*> ground_truth;
   for (const AgentMetrics& agent : metrics->agents) {
-    ground_truth[agent.id] = agent.ground_truth;
+    for (const MapId& map : agent.recording_maps) {
+      ground_truth[map] = &agent.ground_truth;
+    }
   }
   const auto all = ConstraintsWithTruth(session, ground_truth);
   std::vector<ConstraintWithTruth> inter;
@@ -229,7 +255,8 @@ void AddConstraints(const CapturedSession& session, ReportMetrics* metrics) {
 void AddAnchors(const ReportInput& input, const CapturedSession& session, ReportMetrics* metrics) {
   std::vector<AnchorViewer> viewers;
   for (const AgentMetrics& agent : metrics->agents) {
-    viewers.push_back({agent.id, &agent.anchors, &agent.odometry, &agent.ground_truth});
+    viewers.push_back(
+        {agent.id, &agent.anchors, &agent.odometry, &agent.ground_truth, &agent.recording_maps});
   }
   metrics->anchors = AnchorsOf(session, viewers, input.anchors);
 }
@@ -237,7 +264,7 @@ void AddAnchors(const ReportInput& input, const CapturedSession& session, Report
 }  // namespace
 
 bool AgentMetrics::AteCounts() const {
-  return server && coverage && *coverage >= 0.95 && maps.size() == 1;
+  return server && coverage && *coverage >= 0.95 && recording_maps.size() == 1;
 }
 
 size_t ReportMetrics::IndexOf(int32_t agent_id) const {
@@ -264,11 +291,14 @@ ReportMetrics ComputeMetrics(const ReportInput& input, const CapturedSession& se
     metrics.notes.push_back(fmt::format("{} died and was restarted{}", process,
                                         count == 1 ? "" : fmt::format(", {} times", count)));
   }
-  for (FinalGroup& group : FinalGroups(session)) {
+  std::vector<FinalGroup> groups = FinalGroups(session);
+  const MapSpans spans = SpansOf(groups);
+  for (FinalGroup& group : groups) {
     metrics.groups.push_back({std::move(group), std::nullopt, {}});
   }
   for (const auto& [id, run] : Runs(input, session)) {
-    metrics.agents.push_back(MetricsOf(run, session, metrics.groups, &metrics.notes, readings));
+    metrics.agents.push_back(
+        MetricsOf(run, session, metrics.groups, spans, &metrics.notes, readings));
   }
   for (GroupMetrics& group : metrics.groups) {
     AddJoint(metrics.agents, &group);

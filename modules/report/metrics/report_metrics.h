@@ -3,6 +3,7 @@
 // The metrics of a report, from captured logs and the recordings' ground truth.
 
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -18,24 +19,26 @@ namespace pangea {
 
 struct AgentMetrics {
   int32_t id = 0;
-  std::vector<MapId> maps;
+  std::vector<MapId> maps;               // also those of earlier sessions
+  std::set<MapId> recording_maps;        // those made from its recording (recording_maps.h)
   size_t keyframes = 0;                  // of all its maps
   size_t group = 0;                      // its main group: index into ReportMetrics::groups
   MapId main_map;                        // the map with most keyframes in that group
+  std::set<MapId> trajectory_maps;       // of its trajectory: its recording's in that group
   std::map<MapId, Trajectory> odometry;  // T_odom_body; at camera rate if odometry_at_camera_rate
   bool odometry_at_camera_rate = false;
   Trajectory ground_truth;              // of the part that was played; empty for none
   std::optional<double> initialised_s;  // from the first image played to the first pose
-  double path_m = 0;                    // length of the odometry's track, all maps
+  double path_m = 0;                    // length of the odometry's track, its recording's maps
   std::optional<Ate> vio;               // odometry of the main map, SE(3)
-  std::optional<Ate> server;            // its keyframes in the main group, SE(3)
+  std::optional<Ate> server;            // its recording's keyframes in the main group, SE(3)
   std::optional<double> coverage;
   LiveMetrics live;        // of the poses that it showed during the session
   AnchorTrack anchors;     // on its bus
   ProcessSamples samples;  // of the processes on its bus
   AgentRun run;
 
-  // Whether the ATE is meaningful: coverage >= 0.95 and a single map.
+  // Whether the ATE is meaningful: coverage >= 0.95 and a single map of the recording.
   bool AteCounts() const;
 };
 

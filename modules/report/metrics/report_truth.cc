@@ -12,12 +12,12 @@ namespace {
 // 99 % quantiles of chi-square with 6, 3 and 1 degrees of freedom.
 constexpr double kBoundPose = 16.812, kBoundPosition = 11.345, kBoundYaw = 6.635;
 
-std::optional<Rigid3> TruePose(const CapturedKeyframe& keyframe, int32_t agent_id,
-                               const std::map<int32_t, Trajectory>& ground_truth) {
-  const auto truth = ground_truth.find(agent_id);
+std::optional<Rigid3> TruePose(const CapturedKeyframe& keyframe, const MapId& map,
+                               const std::map<MapId, const Trajectory*>& ground_truth) {
+  const auto truth = ground_truth.find(map);
   return truth == ground_truth.end()
              ? std::nullopt
-             : Interpolate(truth->second, keyframe.utime, kMaxGroundTruthGapUs);
+             : Interpolate(*truth->second, keyframe.utime, kMaxGroundTruthGapUs);
 }
 
 NormalisedError Normalised(const std::vector<double>& squared, int dimensions, double bound) {
@@ -51,7 +51,7 @@ std::optional<double> ConstraintsTruth::Precision() const {
 }
 
 std::vector<ConstraintWithTruth> ConstraintsWithTruth(
-    const CapturedSession& session, const std::map<int32_t, Trajectory>& ground_truth) {
+    const CapturedSession& session, const std::map<MapId, const Trajectory*>& ground_truth) {
   std::vector<ConstraintWithTruth> known;
   for (const auto& [id, constraint] : session.constraints) {
     const auto from = session.keyframes.find(constraint.from);
@@ -59,8 +59,8 @@ std::vector<ConstraintWithTruth> ConstraintsWithTruth(
     if (!constraint.accepted || from == session.keyframes.end() || to == session.keyframes.end()) {
       continue;
     }
-    const auto T_from = TruePose(from->second, constraint.from.map.agent_id, ground_truth);
-    const auto T_to = TruePose(to->second, constraint.to.map.agent_id, ground_truth);
+    const auto T_from = TruePose(from->second, constraint.from.map, ground_truth);
+    const auto T_to = TruePose(to->second, constraint.to.map, ground_truth);
     if (T_from && T_to) {
       known.push_back({constraint, T_from->Inverse() * *T_to, from->second.T_odom_body.q});
     }

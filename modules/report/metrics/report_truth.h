@@ -46,9 +46,9 @@ struct ConstraintsTruth {
 };
 
 // The accepted constraints whose keyframes both have ground truth, sorted by id. `ground_truth`: by
-// agent, all in one frame.
+// map, all in one frame.
 std::vector<ConstraintWithTruth> ConstraintsWithTruth(
-    const CapturedSession& session, const std::map<int32_t, Trajectory>& ground_truth);
+    const CapturedSession& session, const std::map<MapId, const Trajectory*>& ground_truth);
 
 ConstraintsTruth CheckConstraints(const std::vector<ConstraintWithTruth>& constraints);
 

@@ -98,15 +98,17 @@ TEST(ConstraintsTruth, NothingToCheckHasNoPrecision) {
 // Keyframe i of both agents at second i, ground truth at 20 Hz to second 10.
 TEST(ConstraintsTruth, OnlyAcceptedOnesWithGroundTruthAtBothEndsAreChecked) {
   CapturedSession session;
-  std::map<int32_t, Trajectory> ground_truth;
+  std::map<MapId, Trajectory> trajectories;
+  std::map<MapId, const Trajectory*> ground_truth;
   for (const MapId& map : {kFirst, kSecond}) {
     for (int i = 0; i < 12; ++i) {
       session.keyframes[{map, i}] = {i * 1'000'000, Rigid3{}, {}};
     }
     for (int i = 0; i <= 200; ++i) {
       const Rigid3 T{YawRotation(0.01 * i), {0.05 * i, 3.0 * map.agent_id, 0}};
-      ground_truth[map.agent_id].push_back({i * 50'000, T});
+      trajectories[map].push_back({i * 50'000, T});
     }
+    ground_truth[map] = &trajectories[map];
   }
   const auto add = [&session](KeyframeId from, KeyframeId to, bool accepted) {
     Constraint constraint;
@@ -120,6 +122,10 @@ TEST(ConstraintsTruth, OnlyAcceptedOnesWithGroundTruthAtBothEndsAreChecked) {
   add({kFirst, 2}, {kSecond, 11}, true);       // after the ground truth
   add({kFirst, 2}, {kSecond, 30}, true);       // a keyframe that was not captured
   add({kFirst, 2}, {MapId{3, 300}, 4}, true);  // an agent without ground truth
+  // a map of the same agent, and of the same time, but of another recording
+  const MapId earlier{kSecond.agent_id, 1};
+  session.keyframes[{earlier, 4}] = {4'000'000, Rigid3{}, {}};
+  add({kFirst, 3}, {earlier, 4}, true);
   const auto known = ConstraintsWithTruth(session, ground_truth);
   ASSERT_EQ(known.size(), 1U);
   const Rigid3 T_from{YawRotation(0.4), {2, 3, 0}};
