@@ -21,10 +21,14 @@ namespace pangea {
 namespace {
 
 // de/dxi: the translation of e is in the measurement's frame, its rotation part is half an angle.
-Matrix6d ErrorOfTangent(const Rigid3& T_from_to) {
+// With sensors, e is (t, q_xyz) of Z^-1 (T_from T_from_sensor)^-1 (T_to T_to_sensor); it does not
+// depend on the first sensor.
+Matrix6d ErrorOfTangent(const Rigid3& T_from_to, const Rigid3& T_to_sensor = Rigid3()) {
+  const Eigen::Matrix3d R = (T_from_to.R() * T_to_sensor.R()).transpose();
   Matrix6d J = Matrix6d::Zero();
-  J.topLeftCorner<3, 3>() = T_from_to.R().transpose();
-  J.bottomRightCorner<3, 3>() = 0.5 * T_from_to.R().transpose();
+  J.topLeftCorner<3, 3>() = R;
+  J.topRightCorner<3, 3>() = -R * Hat(T_from_to.q * T_to_sensor.t);
+  J.bottomRightCorner<3, 3>() = 0.5 * R;
   return J;
 }
 
@@ -75,11 +79,12 @@ class Line {
     return word;
   }
   bool AtEnd() { return (stream_ >> std::ws).eof(); }
-  int64_t Vertex(const std::string& field) {
+  int64_t Vertex(const std::string& field) { return Id(field, "vertex'"); }
+  int64_t Id(const std::string& field, const std::string& of) {
     const std::string word = Word();
     int64_t id = 0;
     if (!ParseNumber(word, &id) || id < 0) {
-      Fail(fmt::format("{} '{}' is no vertex' number", field, Shown(word)));
+      Fail(fmt::format("{} '{}' is no {} number", field, Shown(word), of));
     }
     return id;
   }
@@ -143,16 +148,38 @@ class Reader {
   Reader(const std::string& path, double max_position_m)
       : path_(path), max_position_m_(max_position_m) {}
 
+  // Parameters come first: edges refer to them.
+  void TakeParameter(Line line) {
+    if (line.Word() == "PARAMS_SE3OFFSET") {
+      const int64_t id = line.Id("the id", "parameter's");
+      if (const auto [first, is_new] = parameter_lines_.emplace(id, line.number()); !is_new) {
+        line.Fail(fmt::format("parameter {} is there already, in line {}", id, first->second));
+      }
+      offsets_[id] = line.Pose(max_position_m_);
+      line.End();
+    }
+  }
+
   void Take(Line line) {
     const std::string kind = line.Word();
     if (kind == "VERTEX_SE3:QUAT") {
       TakeVertex(&line);
     } else if (kind == "FIX") {
       TakeFixed(&line);
-    } else if (kind == "EDGE_SE3:QUAT") {
-      TakeEdge(&line);
-    } else if (!kind.empty() && !kind.starts_with('#')) {
-      line.Fail(fmt::format("{} is none of VERTEX_SE3:QUAT, EDGE_SE3:QUAT, FIX", Shown(kind)));
+    } else if (kind == "EDGE_SE3:QUAT" || kind == "EDGE_SE3_OFFSET") {
+      TakeEdge(&line, kind == "EDGE_SE3_OFFSET");
+    } else if (kind.starts_with("EDGE_SE3_PRIOR") || kind.starts_with("EDGE_SE3_XYZPRIOR")) {
+      line.Fail(
+          fmt::format("{} measures one vertex by itself, which is not read: fix the vertex "
+                      "(FIX) in place of it, or leave it out",
+                      Shown(kind)));
+    } else if (kind.starts_with("VERTEX_TRACKXYZ") || kind.starts_with("EDGE_SE3_TRACKXYZ")) {
+      line.Fail(fmt::format("{} is of a landmark: only graphs of poses are read", Shown(kind)));
+    } else if (!kind.empty() && !kind.starts_with('#') && kind != "PARAMS_SE3OFFSET") {
+      line.Fail(
+          fmt::format("{} is none of VERTEX_SE3:QUAT, EDGE_SE3:QUAT, EDGE_SE3_OFFSET, FIX, "
+                      "PARAMS_SE3OFFSET",
+                      Shown(kind)));
     }
   }
 
@@ -186,20 +213,37 @@ class Reader {
     } while (!line->AtEnd());
   }
 
-  void TakeEdge(Line* line) {
+  Rigid3 Offset(Line* line, const std::string& field) {
+    const int64_t id = line->Id(field, "parameter's");
+    const auto offset = offsets_.find(id);
+    if (offset == offsets_.end()) {
+      line->Fail(fmt::format("{}, {}, is no PARAMS_SE3OFFSET of the file", field, id));
+    }
+    return offset->second;
+  }
+
+  void TakeEdge(Line* line, bool with_offsets) {
     GraphEdge edge;
     edge.from = line->Vertex("the first end");
     edge.to = line->Vertex("the second end");
     if (edge.from == edge.to) {
       line->Fail(fmt::format("the edge's ends are both {}", edge.from));
     }
+    Rigid3 T_from_sensor, T_to_sensor;
+    if (with_offsets) {
+      T_from_sensor = Offset(line, "the first end's offset");
+      T_to_sensor = Offset(line, "the second end's offset");
+    }
     edge.T_from_to = line->Pose(max_position_m_);
+    if (with_offsets) {
+      edge.T_from_to = T_from_sensor * edge.T_from_to * T_to_sensor.Inverse();
+    }
     const Matrix6d information = line->Information();
     line->End();
     if (!PositiveDefinite(information)) {
       line->Fail("the information matrix is not positive definite");
     }
-    const Matrix6d inverse = ErrorOfTangent(edge.T_from_to).inverse();
+    const Matrix6d inverse = ErrorOfTangent(edge.T_from_to, T_to_sensor).inverse();
     edge.covariance = inverse * InverseOf(information) * inverse.transpose();
     if (!PositiveDefinite(edge.covariance)) {
       line->Fail("the information matrix cannot be inverted: its shares differ too much");
@@ -231,9 +275,11 @@ class Reader {
   const std::string& path_;
   const double max_position_m_;
   Graph graph_;
-  std::map<int64_t, int> vertex_lines_;  // by vertex
-  std::vector<int> fixed_lines_;         // parallel to graph_.fixed
-  std::vector<int> edge_lines_;          // parallel to graph_.edges
+  std::map<int64_t, Rigid3> offsets_;       // T_body_sensor by parameter
+  std::map<int64_t, int> parameter_lines_;  // by parameter
+  std::map<int64_t, int> vertex_lines_;     // by vertex
+  std::vector<int> fixed_lines_;            // parallel to graph_.fixed
+  std::vector<int> edge_lines_;             // parallel to graph_.edges
   std::map<std::pair<int64_t, int64_t>, std::vector<size_t>> edges_between_;
 };
 
@@ -263,10 +309,18 @@ std::string ToG2o(const Graph& graph) {
 
 Graph ReadG2o(const std::string& path, double max_position_m) {
   std::ifstream file = OpenFile(path);
+  std::vector<std::string> lines;
+  for (std::string text; std::getline(file, text);) {
+    lines.push_back(std::move(text));
+  }
   Reader reader(path, max_position_m);
-  std::string text;
-  for (int number = 1; std::getline(file, text); ++number) {
-    reader.Take(Line(path, number, text));
+  int number = 0;
+  for (const std::string& text : lines) {
+    reader.TakeParameter(Line(path, ++number, text));
+  }
+  number = 0;
+  for (const std::string& text : lines) {
+    reader.Take(Line(path, ++number, text));
   }
   return reader.Finish();
 }

@@ -244,11 +244,17 @@ void AddImport(CLI::App& app, Arguments* arguments) {
   back->add_option("--out", arguments->out, "The new log")->required();
   back->callback([arguments] {
     const std::string& log = arguments->logs.front();
-    const int64_t placed = ImportG2o(log, arguments->g2o, arguments->out, &arguments->readings);
+    const ImportedG2o imported =
+        ImportG2o(log, arguments->g2o, arguments->out, &arguments->readings);
     KeepRecordings({log}, arguments->out);
+    for (const std::string& remark : imported.poses.remarks) {
+      std::cerr << fmt::format("pangea-log: {}\n", remark);
+    }
     std::cout << fmt::format(
-        "{}: {} keyframes as in {}, whose edges are not taken: the log keeps its own\n",
-        arguments->out, placed, arguments->g2o);
+        "{}: {} keyframes as in {}, whose edges are not taken: the log keeps its own; their cost "
+        "was {:.3f} and is {:.3f}\n",
+        arguments->out, imported.keyframes, arguments->g2o, imported.poses.cost_before,
+        imported.poses.cost_after);
   });
 }
 

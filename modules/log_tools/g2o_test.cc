@@ -81,24 +81,28 @@ TEST_F(LogToolsTest, TheG2oFileHasOurCost) {
   EXPECT_NEAR(Cost(again) / ours, 1, 1e-5);
 }
 
-// A report of the new log shows the other solver's poses; here all are lifted by one metre.
+// A report of the new log shows the other solver's poses; here the map is bent upwards.
 TEST_F(LogToolsTest, AG2oFileComesBackIntoTheLog) {
   const NamedGraph named = GraphOf(kSample);
-  Graph lifted = named.graph;
-  for (auto& [number, pose] : lifted.vertices) {
-    pose.t.z() += 1;
+  Graph bent = named.graph;
+  for (auto& [number, pose] : bent.vertices) {
+    pose.t.z() += 0.002 * static_cast<double>(number);
   }
-  std::ofstream(Path("lifted.g2o")) << ToG2o(lifted);
-  EXPECT_EQ(ImportG2o(kSample, Path("lifted.g2o"), Path("lifted.lcm")), 63);
-  const NamedGraph again = GraphOf(Path("lifted.lcm"));
+  std::ofstream(Path("bent.g2o")) << ToG2o(bent);
+  const ImportedG2o imported = ImportG2o(kSample, Path("bent.g2o"), Path("bent.lcm"));
+  EXPECT_EQ(imported.keyframes, 63);
+  EXPECT_TRUE(imported.poses.remarks.empty());
+  EXPECT_NEAR(imported.poses.cost_before / Cost(named.graph), 1, 1e-9);
+  EXPECT_NEAR(imported.poses.cost_after / Cost(bent), 1, 1e-4);
+  const NamedGraph again = GraphOf(Path("bent.lcm"));
   EXPECT_EQ(again.keyframes, named.keyframes);
   EXPECT_EQ(again.graph.edges.size(), named.graph.edges.size());
-  for (const auto& [number, pose] : lifted.vertices) {
+  for (const auto& [number, pose] : bent.vertices) {
     EXPECT_LT(again.graph.vertices.at(number).Minus(pose).norm(), 1e-7);
   }
   // A second import adds nothing: the newest state counts.
   std::ofstream(Path("graph.g2o")) << ToG2o(named.graph);
-  ImportG2o(Path("lifted.lcm"), Path("graph.g2o"), Path("back.lcm"));
+  ImportG2o(Path("bent.lcm"), Path("graph.g2o"), Path("back.lcm"));
   EXPECT_NEAR(Cost(GraphOf(Path("back.lcm")).graph) / Cost(named.graph), 1, 1e-5);
 }
 
@@ -171,7 +175,8 @@ TEST_F(BadG2oTest, NamesLineAndField) {
   EXPECT_THAT(ErrorOf("VERTEX_SE3:QUAT 0 0 0 0 0 0 0 0\n"), testing::HasSubstr("not a rotation"));
   EXPECT_EQ(ErrorOf("\x1b[2J\xff" + std::string(100, 'a') + "\n"),
             "bad.g2o:1: ?[2J?" + std::string(35, 'a') +
-                "... is none of VERTEX_SE3:QUAT, EDGE_SE3:QUAT, FIX");
+                "... is none of VERTEX_SE3:QUAT, EDGE_SE3:QUAT, EDGE_SE3_OFFSET, FIX, "
+                "PARAMS_SE3OFFSET");
 }
 
 TEST_F(BadG2oTest, NothingIsThereTwiceOrNowhere) {
@@ -198,6 +203,63 @@ TEST_F(BadG2oTest, AnInformationMatrixIsPositiveDefinite) {
             "bad.g2o:3: information 6,6 'nan' is not a finite number");
   EXPECT_THAT(ErrorOf(good + Edge("0 1", "1e300")),
               testing::StartsWith("bad.g2o:3: information 6,6 1e300 is not from"));
+}
+
+// g2o writes an offset into every file that it saves.
+TEST_F(BadG2oTest, OffsetsOfSensorsAreRead) {
+  const std::string good = "PARAMS_SE3OFFSET 0 0 0 0 0 0 0 1\n" + std::string(kVertices);
+  EXPECT_EQ(ErrorOf(good + Edge("0 1", "1")), "cost 0");
+  const auto offset_edge = [](const std::string& offsets, const std::string& z) {
+    return "EDGE_SE3_OFFSET 0 1 " + offsets + " " + z +
+           " 0 0 0 0 1 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1\n";
+  };
+  EXPECT_EQ(ErrorOf(good + offset_edge("0 0", "1 0")), "cost 0");
+  // A sensor 0.5 m in front of the second body is 1.5 m from the first; parameters may come last.
+  const std::string ahead = "PARAMS_SE3OFFSET 7 0.5 0 0 0 0 0 1\n";
+  EXPECT_EQ(ErrorOf(good + offset_edge("0 7", "1.5 0") + ahead), "cost 0");
+  EXPECT_EQ(ErrorOf(good + offset_edge("7 0", "0.5 0") + ahead), "cost 0");
+  EXPECT_THAT(ErrorOf(good + offset_edge("0 7", "1 0") + ahead), testing::StartsWith("cost 0.25"));
+  EXPECT_EQ(ErrorOf(good + offset_edge("0 7", "1 0")),
+            "bad.g2o:4: the second end's offset, 7, is no PARAMS_SE3OFFSET of the file");
+  EXPECT_EQ(ErrorOf(good + ahead + ahead), "bad.g2o:5: parameter 7 is there already, in line 4");
+  EXPECT_EQ(ErrorOf("PARAMS_SE3OFFSET 0 0 0 0 0 0 1\n"), "bad.g2o:1: qw is missing");
+}
+
+// g2o's error (edge_se3_offset) at a small deviation, by its definition.
+TEST_F(BadG2oTest, AnOffsetEdgeHasG2osCost) {
+  const Rigid3 T_from_sensor{ExpSo3({0.3, -0.2, 0.5}), {0.1, 0.2, -0.3}};
+  const Rigid3 T_to_sensor{ExpSo3({-0.4, 0.1, 0.2}), {0.5, -0.1, 0.2}};
+  const Rigid3 from{ExpSo3({0.1, 0.7, -0.2}), {1, 2, 3}}, to{ExpSo3({-0.2, 0.3, 0.9}), {2, 1, 3}};
+  Vector6d xi;
+  xi << 2e-4, -1e-4, 3e-4, -1e-4, 2e-4, 1e-4;
+  const Rigid3 Z = ((from * T_from_sensor).Inverse() * to * T_to_sensor).Plus(xi);
+  const auto text_of = [](const Rigid3& T) {
+    return fmt::format("{:.15g} {:.15g} {:.15g} {:.15g} {:.15g} {:.15g} {:.15g}", T.t.x(), T.t.y(),
+                       T.t.z(), T.q.x(), T.q.y(), T.q.z(), T.q.w());
+  };
+  std::ofstream(Path("offset.g2o"))
+      << "PARAMS_SE3OFFSET 1 " << text_of(T_from_sensor) << "\nPARAMS_SE3OFFSET 2 "
+      << text_of(T_to_sensor) << "\nVERTEX_SE3:QUAT 0 " << text_of(from) << "\nVERTEX_SE3:QUAT 1 "
+      << text_of(to) << "\nEDGE_SE3_OFFSET 0 1 1 2 " << text_of(Z)
+      << " 10 1 0 0 2 0 20 0 0 0 0 30 0 1 0 400 0 0 500 0 600\n";
+  const Rigid3 delta = Z.Inverse() * (from * T_from_sensor).Inverse() * to * T_to_sensor;
+  Vector6d e;
+  e << delta.t, (delta.q.w() < 0 ? -1 : 1) * delta.q.vec();
+  Matrix6d information = Vector6d(10, 20, 30, 400, 500, 600).asDiagonal();
+  information(0, 1) = information(1, 0) = 1;
+  information(0, 4) = information(4, 0) = 2;
+  information(2, 4) = information(4, 2) = 1;
+  EXPECT_NEAR(Cost(ReadG2o(Path("offset.g2o"))) / e.dot(information * e), 1, 1e-2);
+}
+
+TEST_F(BadG2oTest, WhatElseRefersToAnOffsetIsRefusedByItsLine) {
+  const std::string good = "PARAMS_SE3OFFSET 0 0 0 0 0 0 0 1\n" + std::string(kVertices);
+  EXPECT_THAT(ErrorOf(good + "EDGE_SE3_PRIOR 0 0 0 0 0 0 0 0 1\n"),
+              testing::StartsWith("bad.g2o:4: EDGE_SE3_PRIOR measures one vertex by itself"));
+  EXPECT_THAT(ErrorOf(good + "VERTEX_TRACKXYZ 2 0 0 0\n"),
+              testing::StartsWith("bad.g2o:4: VERTEX_TRACKXYZ is of a landmark"));
+  EXPECT_THAT(ErrorOf(good + "EDGE_SE3_TRACKXYZ 0 2 0 0 0 0 1 0 0 1 0 1\n"),
+              testing::StartsWith("bad.g2o:4: EDGE_SE3_TRACKXYZ is of a landmark"));
 }
 
 // GTSAM numbers vertices by a letter in the highest byte.

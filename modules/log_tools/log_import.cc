@@ -56,11 +56,12 @@ MapState Solved(const FinalGroup& group, const CapturedSession& session, const G
 }
 
 // The messages of every group's new state.
-std::vector<map_state_t> Chunks(const CapturedSession& session, const Graph& solved,
+std::vector<map_state_t> Chunks(const CapturedSession& session,
+                                const std::vector<FinalGroup>& groups, const Graph& solved,
                                 const std::string& g2o) {
   std::vector<map_state_t> chunks;
   int next = 0;
-  for (const FinalGroup& group : FinalGroups(session)) {
+  for (const FinalGroup& group : groups) {
     for (map_state_t& chunk : ToMessages(Solved(group, session, solved, &next))) {
       if (const auto read = Parse(chunk); !read.value) {
         throw std::runtime_error(fmt::format("{}: the group of map {} cannot be placed so: {}", g2o,
@@ -74,11 +75,15 @@ std::vector<map_state_t> Chunks(const CapturedSession& session, const Graph& sol
 
 }  // namespace
 
-int64_t ImportG2o(const std::string& log, const std::string& g2o, const std::string& out,
-                  LogReadings* readings) {
-  const Graph solved = ReadG2o(g2o, messages_checks::kMaxDistance);
-  CheckVertices(GraphOf(log, readings), solved, g2o);
-  const std::vector<map_state_t> chunks = Chunks(ReadServerLog(log, readings), solved, g2o);
+ImportedG2o ImportG2o(const std::string& log, const std::string& g2o, const std::string& out,
+                      LogReadings* readings) {
+  Graph solved = ReadG2o(g2o, messages_checks::kMaxDistance);
+  const NamedGraph exported = GraphOf(log, readings);
+  CheckVertices(exported, solved, g2o);
+  const CapturedSession session = ReadServerLog(log, readings);
+  const std::vector<FinalGroup> groups = FinalGroups(session);
+  SolvedPoses poses = PlaceInMapFrames(exported.graph, groups, g2o, &solved);
+  const std::vector<map_state_t> chunks = Chunks(session, groups, solved, g2o);
   NewLog made(out);
   int64_t latest = 0;
   const auto copy = [&](const LogEvent& event) {
@@ -90,7 +95,7 @@ int64_t ImportG2o(const std::string& log, const std::string& g2o, const std::str
     made.Write(++latest, std::string(channels::kMapState), EncodeMessage(chunk));
   }
   made.Keep();
-  return std::ssize(solved.vertices);
+  return {std::ssize(solved.vertices), std::move(poses)};
 }
 
 }  // namespace pangea
