@@ -79,7 +79,7 @@ std::set<MapId> MapsOfRecording(const AgentRun& run, const std::set<MapId>& maps
     notes->push_back(fmt::format(
         "agent {}: {} of its {} maps, {}, {}; not compared with the agent's ground truth", run.id,
         others.size(), maps.size(), fmt::join(others, ", "),
-        run.maps ? "are of earlier sessions"
+        run.maps ? "are of other sessions"
                  : "overlap in time, so they are of different recordings, and which of them is of "
                    "the known one is not recorded"));
   }

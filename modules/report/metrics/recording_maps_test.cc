@@ -62,7 +62,7 @@ class RecordingMapsTest : public ReportWorld {
     EXPECT_EQ(report["constraints_truth"]["checked"], 0);
     EXPECT_THAT(report["notes"],
                 Contains(HasSubstr("agent 1: 1 of its 2 maps, " + ToString(Earlier()) +
-                                   ", are of earlier sessions")));
+                                   ", are of other sessions")));
   }
 
   void ExpectATrajectoryForEachMap() const {
