@@ -17,7 +17,7 @@ constexpr size_t kPoints = 60;     // features that are compared
 constexpr size_t kMinPoints = 10;  // with fewer, only equal pixels tell
 constexpr int kHalf_px = 5;        // of the patch around a feature
 // Copies that were compressed anew differ by 0.02 px at this share of the features, new images of
-// a body at rest by 0.1 px, for the noise of the sensor is new.
+// a stationary body by 0.1 px, for the noise of the sensor is new.
 constexpr double kShare = 0.8;
 constexpr double kMaxShift_px = 0.15;
 constexpr double kShareOfExpected = 0.25;
