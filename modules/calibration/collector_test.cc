@@ -56,7 +56,7 @@ cv::Mat Noise(int seed) {
 TEST(Collector, ForgetsWhatIsOld) {
   Collector collector(64, 48, ImuNoise{}, std::nullopt);
   for (int i = 0; i < 10; ++i) {
-    collector.AddImage(1000 * i, Noise(1));
+    collector.AddImage(1000 * i, Noise(i));
     collector.AddImu({.utime = 1000 * i});
   }
   collector.Forget(6000);
@@ -71,7 +71,7 @@ TEST(Collector, TakesOnlyPlausibleInputInTheOrderOfTime) {
   Collector collector(64, 48, ImuNoise{}, std::nullopt);
   for (const int64_t utime : {1000, 2000, 2000, 1500, 3000}) {
     collector.AddImu({.utime = utime});
-    collector.AddImage(utime, Noise(1));
+    collector.AddImage(utime, Noise(static_cast<int>(utime)));
   }
   collector.AddImu({.utime = 4000, .gyro = Eigen::Vector3d(0, std::nan(""), 0)});
   ASSERT_EQ(collector.input().imu.size(), 3U);

@@ -3,7 +3,6 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cstring>
-#include <map>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -14,8 +13,9 @@ namespace pangea::vio {
 namespace {
 
 constexpr size_t kPoints = 60;     // features that are compared
-constexpr size_t kMinPoints = 10;  // with fewer, only equal pixels tell
-constexpr int kHalf_px = 5;        // of the patch around a feature
+constexpr size_t kMinPoints = 10;  // a blank view, as of a covered lens, may be equal to the next
+constexpr double kMinDeterminant = 1;
+constexpr int kHalf_px = 5;  // of the patch around a feature
 // Copies that were compressed anew differ by 0.02 px at this share of the features, new images of
 // a stationary body by 0.1 px, for the noise of the sensor is new.
 constexpr double kShare = 0.8;
@@ -28,7 +28,7 @@ constexpr double kSameSpeed_s = 0.07;
 // After this time an image counts as new if its pixels have changed: everything in view moves with
 // the camera. If they have not, but none is expected to: a still scene without noise.
 constexpr double kLongest_s = 0.5;
-constexpr double kLongestStill_s = 0.1;
+constexpr double kLongestStill_s = 0.08;
 
 double Seconds(int64_t us) { return 1e-6 * static_cast<double>(us); }
 
@@ -53,37 +53,51 @@ bool HasPatch(const cv::Mat& image, const cv::Point& at) {
 // How far the patch around `at` has moved: one step of Lucas & Kanade, apart from a change of
 // brightness. It is only exact for shifts below a pixel, which is what must be told from none.
 std::optional<double> Shift_px(const cv::Mat& before, const cv::Mat& after, const cv::Point& at) {
-  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  // Sums over the patch, in integers: of the slopes (twice the gradient), of the difference, and of
+  // their products.
+  int sx = 0, sy = 0, sd = 0, xx = 0, xy = 0, yy = 0, xd = 0, yd = 0;
   for (int y = at.y - kHalf_px; y <= at.y + kHalf_px; ++y) {
     const uchar* row = before.ptr<uchar>(y);
     const uchar* above = before.ptr<uchar>(y - 1);
     const uchar* below = before.ptr<uchar>(y + 1);
     const uchar* now = after.ptr<uchar>(y);
     for (int x = at.x - kHalf_px; x <= at.x + kHalf_px; ++x) {
-      const Eigen::Vector3d slope(0.5 * (row[x + 1] - row[x - 1]), 0.5 * (below[x] - above[x]), 1);
-      normal += slope * slope.transpose();
-      right += slope * (row[x] - now[x]);
+      const int slope_x = row[x + 1] - row[x - 1], slope_y = below[x] - above[x];
+      const int difference = row[x] - now[x];
+      sx += slope_x;
+      sy += slope_y;
+      sd += difference;
+      xx += slope_x * slope_x;
+      xy += slope_x * slope_y;
+      yy += slope_y * slope_y;
+      xd += slope_x * difference;
+      yd += slope_y * difference;
     }
   }
-  const Eigen::FullPivLU<Eigen::Matrix3d> solver(normal);
-  if (!solver.isInvertible()) {
+  constexpr double kPixels = (2 * kHalf_px + 1) * (2 * kHalf_px + 1);
+  const auto central = [](int product, int a, int b) {
+    return product - static_cast<double>(a) * b / kPixels;
+  };
+  Eigen::Matrix2d normal;
+  normal << central(xx, sx, sx), central(xy, sx, sy), central(xy, sx, sy), central(yy, sy, sy);
+  if (normal.determinant() < kMinDeterminant) {
     return std::nullopt;
   }
-  return solver.solve(right).head<2>().norm();
+  const Eigen::Vector2d right(central(xd, sx, sd), central(yd, sy, sd));
+  return 2 * (normal.inverse() * right).norm();
 }
 
 }  // namespace
 
 void RepeatedImages::NoteNew(const cv::Mat& image, const TrackedFrame& frame) {
-  std::map<int32_t, Eigen::Vector2f> before;
-  for (const Observation& one : frame_.observations) {
-    before[one.landmark_id] = one.pixel;
-  }
   std::vector<double> shifts;
+  auto last = frame_.observations.begin();  // both in the order of their ids
   for (const Observation& one : frame.observations) {
-    if (const auto last = before.find(one.landmark_id); last != before.end()) {
-      shifts.push_back((one.pixel - last->second).norm());
+    while (last != frame_.observations.end() && last->landmark_id < one.landmark_id) {
+      ++last;
+    }
+    if (last != frame_.observations.end() && last->landmark_id == one.landmark_id) {
+      shifts.push_back((one.pixel - last->pixel).norm());
     }
   }
   speed_px_s_ = shifts.size() < kMinPoints
@@ -97,7 +111,8 @@ void RepeatedImages::NoteNew(const cv::Mat& image, const TrackedFrame& frame) {
 double RepeatedImages::ExpectedShift_px(const Eigen::Quaterniond& q_cam_lastcam,
                                         double max_rotation_error, double age_s) const {
   std::vector<double> shifts;
-  for (const Observation& one : frame_.observations) {
+  for (size_t i = 0; i < frame_.observations.size(); i += PointStep()) {
+    const Observation& one = frame_.observations[i];
     if (const auto pixel = camera_.Project(q_cam_lastcam * one.ray.homogeneous())) {
       shifts.push_back((*pixel - one.pixel.cast<double>()).norm());
     }
@@ -107,27 +122,34 @@ double RepeatedImages::ExpectedShift_px(const Eigen::Quaterniond& q_cam_lastcam,
   return std::max(rotated, age_s < kSameSpeed_s ? speed_px_s_ * age_s : 0);
 }
 
+// Of all features, a sample of kPoints or some more.
+size_t RepeatedImages::PointStep() const {
+  return std::max<size_t>(1, frame_.observations.size() / kPoints);
+}
+
+// A moving image is found by its first few features.
 bool RepeatedImages::HasMovedLessThan(double shift_px, const cv::Mat& image) const {
-  std::vector<double> shifts;
-  const size_t step = std::max<size_t>(1, frame_.observations.size() / kPoints);
-  for (size_t i = 0; i < frame_.observations.size(); i += step) {
+  const size_t count = (frame_.observations.size() + PointStep() - 1) / PointStep();
+  const double most_moved = (1 - kShare) * static_cast<double>(count);
+  size_t still = 0, moved = 0;
+  for (size_t i = 0; i < frame_.observations.size(); i += PointStep()) {
     const Eigen::Vector2f& pixel = frame_.observations[i].pixel;
     const cv::Point at(cvRound(pixel.x()), cvRound(pixel.y()));
     const auto shift = HasPatch(image, at) ? Shift_px(image_, image, at) : std::nullopt;
     if (shift) {
-      shifts.push_back(*shift);
+      ++(*shift < shift_px ? still : moved);
+    }
+    if (static_cast<double>(moved) > most_moved) {
+      return false;
     }
   }
-  const auto small =
-      std::count_if(shifts.begin(), shifts.end(), [&](double one) { return one < shift_px; });
-  return shifts.size() >= kMinPoints &&
-         static_cast<double>(small) >= kShare * static_cast<double>(shifts.size());
+  return still >= kMinPoints;
 }
 
 bool RepeatedImages::IsRepeat(int64_t utime, const cv::Mat& image,
                               const Eigen::Quaterniond& q_cam_lastcam,
                               double max_rotation_error) const {
-  if (image_.empty() || image.size() != image_.size()) {
+  if (frame_.observations.size() < kMinPoints || image.size() != image_.size()) {
     return false;
   }
   const double age_s = Seconds(utime - frame_.utime);

@@ -33,6 +33,7 @@ class RepeatedImages {
  private:
   double ExpectedShift_px(const Eigen::Quaterniond& q_cam_lastcam, double max_rotation_error,
                           double age_s) const;
+  size_t PointStep() const;
   bool HasMovedLessThan(double shift_px, const cv::Mat& image) const;
 
   CameraModel camera_;
