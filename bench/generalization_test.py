@@ -164,6 +164,25 @@ class SpoilTest(unittest.TestCase):
         matrix = numbers(self.spoiled("extrinsics").camera_yaml, "data")
         self.assertAlmostEqual(math.degrees(math.acos((matrix[0] + matrix[5] + matrix[10] - 1) / 2)), 0.5, places=6)
 
+    def test_a_wrong_direction_is_its_own_inverse(self):
+        before = Recording(self.mav0)
+        for what in ("negated_accel", "negated_gyro", "swapped_accel", "inverse_extrinsics"):
+            twice = Recording(self.mav0)
+            twice.imu = [[row[0], "1.0", "2.0", "3.0", "4.0", "5.0", "6.0"] for row in twice.imu]
+            twice.camera_yaml = before.camera_yaml.replace("[1, 0, 0, 0, 0, 1, 0, 0,", "[0, -1, 0, 0.5, 1, 0, 0, 0.25,")
+            imu, yaml = [float(value) for value in twice.imu[0][1:]], numbers(twice.camera_yaml, "data")
+            SPOILERS[what](twice)
+            once = [float(value) for value in twice.imu[0][1:]], numbers(twice.camera_yaml, "data")
+            self.assertNotEqual(once, (imu, yaml), what)
+            SPOILERS[what](twice)
+            self.assertEqual(([float(value) for value in twice.imu[0][1:]], numbers(twice.camera_yaml, "data")), (imu, yaml), what)
+
+    def test_wrong_axes_and_units(self):
+        self.assertEqual(numbers(self.spoiled("turned_camera").camera_yaml, "data")[:8], [0, -1, 0, 0, 1, 0, 0, 0])
+        self.assertEqual(numbers(self.spoiled("backward_camera").camera_yaml, "data")[:12], [-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, 0])
+        self.assertEqual(numbers(self.spoiled("long_focal_length").camera_yaml, "intrinsics"), [560, 574, 320, 240])
+        self.assertEqual(numbers(self.spoiled("short_focal_length").camera_yaml, "intrinsics"), [280, 287, 320, 240])
+
     def test_clocks(self):
         before, late = Recording(self.mav0), self.spoiled("late_images")
         self.assertEqual(int(late.imu[7][0]) - int(before.imu[7][0]), 40_000_000)

@@ -262,11 +262,78 @@ def shown_too_early(recording):
         row[1] = after[1]
 
 
+def scaled_imu(recording, columns, factor):
+    for row in recording.imu:
+        row[columns] = [f"{factor * float(value):.10f}" for value in row[columns]]
+
+
+def negated_accel(recording):
+    """The accelerometer with the opposite sign, as some systems' conventions have it."""
+    scaled_imu(recording, slice(4, 7), -1)
+
+
+def negated_gyro(recording):
+    """The gyroscope with the opposite sign."""
+    scaled_imu(recording, slice(1, 4), -1)
+
+
+def gyro_in_degrees(recording):
+    """The gyroscope in degrees/s."""
+    scaled_imu(recording, slice(1, 4), math.degrees(1))
+
+
+def swapped_accel(recording):
+    """The first two axes of the accelerometer swapped."""
+    for row in recording.imu:
+        row[4], row[5] = row[5], row[4]
+
+
+def product(a, b):
+    """The product of two 4x4 matrices, row by row."""
+    return [sum(a[4 * i + k] * b[4 * k + j] for k in range(4)) for i in range(4) for j in range(4)]
+
+
+def inverse_extrinsics(recording):
+    """T_BS in the wrong direction: camera from body."""
+    m = numbers(recording.camera_yaml, "data")
+    inverse = [value for i in range(3) for value in (m[i], m[4 + i], m[8 + i], -sum(m[4 * k + i] * m[4 * k + 3] for k in range(3)))]
+    recording.camera_yaml = put(recording.camera_yaml, "data", [*inverse, 0, 0, 0, 1])
+
+
+def turned_camera(recording):
+    """The camera turned by 90 degrees about its optical axis."""
+    matrix = product(numbers(recording.camera_yaml, "data"), [0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1])
+    recording.camera_yaml = put(recording.camera_yaml, "data", matrix)
+
+
+def backward_camera(recording):
+    """The camera turned by 180 degrees about the image's vertical."""
+    matrix = product(numbers(recording.camera_yaml, "data"), [-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1])
+    recording.camera_yaml = put(recording.camera_yaml, "data", matrix)
+
+
+def scaled_focal_length(recording, factor):
+    fx, fy, cx, cy = numbers(recording.camera_yaml, "intrinsics")
+    recording.camera_yaml = put(recording.camera_yaml, "intrinsics", [factor * fx, factor * fy, cx, cy])
+
+
+def long_focal_length(recording):
+    """Focal length 1.4 times too long, as of another resolution."""
+    scaled_focal_length(recording, 1.4)
+
+
+def short_focal_length(recording):
+    """Focal length 0.7 times too short."""
+    scaled_focal_length(recording, 0.7)
+
+
 SPOILERS = {f.__name__: f for f in (half_rate, image_gaps, lone_images, imu_gaps, disorder, focal_length, extrinsics, late_images,
                                     jitter, accel_bias, phone_imu, noise_10_times, noise_a_tenth, third_of_imu, large_accel_bias,
                                     accel_scale, lost_imu, doubled_imu, browser_motion, browser_stamps, covered, hand, pocket,
                                     exposure_steps, people, crowd,
-                                    copies_at_60_hz, repeated_images, shown_too_early)}
+                                    copies_at_60_hz, repeated_images, shown_too_early, negated_accel, negated_gyro,
+                                    gyro_in_degrees, swapped_accel, inverse_extrinsics, turned_camera, backward_camera,
+                                    long_focal_length, short_focal_length)}
 
 
 def main():

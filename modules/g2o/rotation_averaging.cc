@@ -1,11 +1,11 @@
 #include "g2o/rotation_averaging.h"
 
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <functional>
 #include <optional>
 
 #include "block_equations/block_equations.h"
+#include "core/nearest_rotation.h"
 
 namespace pangea {
 namespace {
@@ -19,12 +19,6 @@ double RotationWeight(const GraphEdge& edge) {
 }
 double PositionWeight(const GraphEdge& edge) {
   return 3 / edge.covariance.topLeftCorner<3, 3>().trace();
-}
-
-Matrix3d NearestRotation(const Matrix3d& M) {
-  const Eigen::JacobiSVD<Matrix3d> svd(M, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
-  return svd.matrixU() * Vector3d(1, 1, sign).asDiagonal() * svd.matrixV().transpose();
 }
 
 // One edge of the least-squares problem  min sum weight |x_to - M x_from - c|^2.

@@ -166,7 +166,7 @@ Trajectory ReadGroundTruthIn(const std::string& mav0, const Rigid3& T_s_body,
     try {
       // Both sensors' T_BS go from sensor to rig: T_ref_body = T_ref_gt * T_s_gt^-1 * T_s_body.
       const Rigid3 T_gt_body =
-          ReadEurocExtrinsics((folder / "sensor.yaml").string()).Inverse() * T_s_body;
+          ReadEurocExtrinsics((folder / "sensor.yaml").string(), warnings).Inverse() * T_s_body;
       Trajectory trajectory = ReadEurocGroundTruth((folder / "data.csv").string(), warnings);
       for (StampedPose& pose : trajectory) {
         pose.T = pose.T * T_gt_body;
@@ -199,14 +199,14 @@ EurocRecording::EurocRecording(const std::string& folder) : mav0_(FindMav0(folde
 
 void EurocRecording::ReadCamera() {
   const std::string file = EurocCalibrationFile(mav0_, "cam0");
-  camera_ = ReadEurocCamera(file);
+  camera_ = ReadEurocCamera(file, &warnings_);
   Append(UnreadFields(file, "cam0"), &warnings_);
   calibration_sigmas_ = ReadEurocCalibrationSigmas(file);
 }
 
 Rigid3 EurocRecording::ReadImuCalibration() {
   const std::string file = EurocCalibrationFile(mav0_, "imu0");
-  const EurocImuCalibration calibration = ReadEurocImuCalibration(file);
+  const EurocImuCalibration calibration = ReadEurocImuCalibration(file, &warnings_);
   Append(UnreadFields(file, "imu0"), &warnings_);
   imu_noise_ = calibration.noise;
   return calibration.T_s_body;

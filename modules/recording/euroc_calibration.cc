@@ -9,6 +9,7 @@
 #include <tuple>
 #include <vector>
 
+#include "core/nearest_rotation.h"
 #include "files/text_file.h"
 #include "recording/sensor_file.h"
 
@@ -65,31 +66,63 @@ std::vector<double> Matrix4(const YAML::Node& root, const std::string& file,
   return values;
 }
 
-Rigid3 Transform(const YAML::Node& root, const std::string& file, const std::string& key) {
+// Published matrices are rounded to a few digits: the nearest rotation is taken, with a warning if
+// the difference may matter.
+Eigen::Quaterniond Rotation(const Eigen::Matrix3d& R, const std::string& file,
+                            const std::string& key, std::vector<std::string>* warnings) {
+  constexpr double kExact = 1e-3;    // |R R' - I|: half of it is an error of 0.03 degrees
+  constexpr double kRounded = 1e-2;  // three digits give up to 0.003
+  const double error = (R * R.transpose() - Eigen::Matrix3d::Identity()).norm();
+  if (R.determinant() < 0) {
+    Throw(file, fmt::format("the rotation in '{}' is left-handed (det {:.2g}): one axis has the "
+                            "wrong sign, or two are swapped; the third column must be the cross "
+                            "product of the first two",
+                            key, R.determinant()));
+  }
+  if (error > kRounded) {
+    Throw(file, fmt::format("the rotation in '{}' is not one (|R R' - I| = {:.2g}): its columns "
+                            "must have length 1 and right angles; give at least three digits",
+                            key, error));
+  }
+  if (error <= kExact) {
+    return Eigen::Quaterniond(R).normalized();
+  }
+  if (warnings != nullptr) {
+    warnings->push_back(
+        fmt::format("{}: the rotation in '{}' is rounded (|R R' - I| = {:.2g}); the nearest "
+                    "rotation is taken, give more digits if there are any",
+                    file, key, error));
+  }
+  return Eigen::Quaterniond(NearestRotation(R)).normalized();
+}
+
+Rigid3 Transform(const YAML::Node& root, const std::string& file, const std::string& key,
+                 std::vector<std::string>* warnings) {
   const std::vector<double> m = Matrix4(root, file, key);
+  if (Eigen::Vector4d(m[12], m[13], m[14], m[15] - 1).norm() > 1e-6) {
+    Throw(file, fmt::format("the last row of '{}' must be 0, 0, 0, 1: is the matrix given column "
+                            "by column?",
+                            key));
+  }
   Eigen::Matrix3d R;
   R << m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10];
-  const double error = (R * R.transpose() - Eigen::Matrix3d::Identity()).norm();
-  if (error > 1e-3 || R.determinant() < 0) {
-    Throw(file, fmt::format("the rotation in '{}' is not one (|R R' - I| = {:.2g}, det {:.2g})",
-                            key, error, R.determinant()));
-  }
   const Eigen::Vector3d t(m[3], m[7], m[11]);
   if (t.norm() > CameraModel::kMaxLever_m) {
     Throw(file, fmt::format("the translation in '{}' is {:.3g} m long; at most {} are plausible: "
                             "is it in metres?",
                             key, t.norm(), CameraModel::kMaxLever_m));
   }
-  return {Eigen::Quaterniond(R).normalized(), t};
+  return {Rotation(R, file, key, warnings), t};
 }
 
 // EuRoC's T_BS of a camera, or the inverse of Kalibr's T_cam_imu.
-Rigid3 CameraExtrinsics(const YAML::Node& root, const std::string& file) {
+Rigid3 CameraExtrinsics(const YAML::Node& root, const std::string& file,
+                        std::vector<std::string>* warnings) {
   if (root["T_BS"]) {
-    return Transform(root, file, "T_BS");
+    return Transform(root, file, "T_BS", warnings);
   }
   if (root["T_cam_imu"]) {
-    return Transform(root, file, "T_cam_imu").Inverse();
+    return Transform(root, file, "T_cam_imu", warnings).Inverse();
   }
   Throw(file,
         "field 'T_BS' (body from camera, a 4x4 matrix with rows, cols and data) is missing, "
@@ -186,11 +219,12 @@ std::string EurocCalibrationFile(const std::string& mav0, const std::string& sen
                     sensor == "cam0" ? "camchain-imucam.yaml" : "imu.yaml"));
 }
 
-CameraModel ReadEurocCamera(const std::string& sensor_yaml) {
-  return ParseEurocCamera(ReadTextFile(sensor_yaml), sensor_yaml);
+CameraModel ReadEurocCamera(const std::string& sensor_yaml, std::vector<std::string>* warnings) {
+  return ParseEurocCamera(ReadTextFile(sensor_yaml), sensor_yaml, warnings);
 }
 
-CameraModel ParseEurocCamera(const std::string& text, const std::string& sensor_yaml) {
+CameraModel ParseEurocCamera(const std::string& text, const std::string& sensor_yaml,
+                             std::vector<std::string>* warnings) {
   const YAML::Node root = LoadSensorFile(text, sensor_yaml, "cam0");
   const YAML::Node model = root["camera_model"];
   if (model && (!model.IsScalar() || model.Scalar() != "pinhole")) {
@@ -217,7 +251,7 @@ CameraModel ParseEurocCamera(const std::string& text, const std::string& sensor_
   camera.cy = k[3];
   const std::vector<double> d = Coefficients(root, sensor_yaml);
   camera.distortion << d[0], d[1], d[2], d[3];
-  camera.T_body_cam = CameraExtrinsics(root, sensor_yaml);
+  camera.T_body_cam = CameraExtrinsics(root, sensor_yaml, warnings);
   camera.readout_s = OptionalNumber(root, sensor_yaml, "readout_s", 0);
   camera.time_offset_s = TimeOffset(root, sensor_yaml, camera.readout_s);
   if (const auto invalid = camera.Invalid()) {
@@ -266,17 +300,19 @@ std::optional<CalibrationSigmas> ParseEurocCalibrationSigmas(const std::string& 
   return is_any ? std::optional(sigmas) : std::nullopt;
 }
 
-EurocImuCalibration ReadEurocImuCalibration(const std::string& sensor_yaml) {
-  return ParseEurocImuCalibration(ReadTextFile(sensor_yaml), sensor_yaml);
+EurocImuCalibration ReadEurocImuCalibration(const std::string& sensor_yaml,
+                                            std::vector<std::string>* warnings) {
+  return ParseEurocImuCalibration(ReadTextFile(sensor_yaml), sensor_yaml, warnings);
 }
 
 EurocImuCalibration ParseEurocImuCalibration(const std::string& text,
-                                             const std::string& sensor_yaml) {
+                                             const std::string& sensor_yaml,
+                                             std::vector<std::string>* warnings) {
   const YAML::Node root = LoadSensorFile(text, sensor_yaml, "imu0");
   EurocImuCalibration calibration;
   const bool is_kalibr = IsKalibrImu(root);
   if (!is_kalibr) {
-    calibration.T_s_body = Transform(root, sensor_yaml, "T_BS");
+    calibration.T_s_body = Transform(root, sensor_yaml, "T_BS", warnings);
   }
   ImuNoise& noise = calibration.noise;
   // Values are in SI units; those beyond the bounds are probably in another unit.
@@ -308,12 +344,13 @@ EurocImuCalibration ParseEurocImuCalibration(const std::string& text,
   return calibration;
 }
 
-Rigid3 ReadEurocExtrinsics(const std::string& sensor_yaml) {
+Rigid3 ReadEurocExtrinsics(const std::string& sensor_yaml, std::vector<std::string>* warnings) {
   if (!Exists(sensor_yaml)) {
     return {};
   }
   const YAML::Node root = LoadSensorFile(ReadTextFile(sensor_yaml), sensor_yaml, "imu0");
-  return root["T_BS"] && !IsKalibrImu(root) ? Transform(root, sensor_yaml, "T_BS") : Rigid3();
+  return root["T_BS"] && !IsKalibrImu(root) ? Transform(root, sensor_yaml, "T_BS", warnings)
+                                            : Rigid3();
 }
 
 }  // namespace pangea

@@ -5,6 +5,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/calibration_sigmas.h"
 #include "core/camera_model.h"
@@ -24,18 +25,24 @@ std::optional<std::string> FindEurocCalibrationFile(const std::string& mav0,
 // The same, but throws std::runtime_error when there is neither.
 std::string EurocCalibrationFile(const std::string& mav0, const std::string& sensor);
 // Note: T_body_cam of the result is the file's T_BS, from the camera to the rig frame.
-// All functions throw std::runtime_error with file and field.
-CameraModel ReadEurocCamera(const std::string& sensor_yaml);
+// All functions throw std::runtime_error with file and field. `warnings`, if given, gets what was
+// repaired: a rotation of a few digits.
+CameraModel ReadEurocCamera(const std::string& sensor_yaml,
+                            std::vector<std::string>* warnings = nullptr);
 // Nothing when the file has none of the keys (docs/recordings.md); a missing key gives the default.
 std::optional<CalibrationSigmas> ReadEurocCalibrationSigmas(const std::string& sensor_yaml);
-EurocImuCalibration ReadEurocImuCalibration(const std::string& sensor_yaml);
+EurocImuCalibration ReadEurocImuCalibration(const std::string& sensor_yaml,
+                                            std::vector<std::string>* warnings = nullptr);
 // The same for a text; `sensor_yaml` is its name in error messages.
-CameraModel ParseEurocCamera(const std::string& text, const std::string& sensor_yaml);
+CameraModel ParseEurocCamera(const std::string& text, const std::string& sensor_yaml,
+                             std::vector<std::string>* warnings = nullptr);
 std::optional<CalibrationSigmas> ParseEurocCalibrationSigmas(const std::string& text,
                                                              const std::string& sensor_yaml);
 EurocImuCalibration ParseEurocImuCalibration(const std::string& text,
-                                             const std::string& sensor_yaml);
+                                             const std::string& sensor_yaml,
+                                             std::vector<std::string>* warnings = nullptr);
 // T_BS of any sensor; the identity when the file or the key is missing.
-Rigid3 ReadEurocExtrinsics(const std::string& sensor_yaml);
+Rigid3 ReadEurocExtrinsics(const std::string& sensor_yaml,
+                           std::vector<std::string>* warnings = nullptr);
 
 }  // namespace pangea

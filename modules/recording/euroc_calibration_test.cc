@@ -6,6 +6,8 @@
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "recording/test_complaint.h"
 
@@ -13,7 +15,9 @@ namespace pangea {
 namespace {
 
 namespace fs = std::filesystem;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 
 // Kalibr's layouts (its wiki, "YAML formats"). The camera looks along the body's x axis, 0.1 m
 // before it.
@@ -56,6 +60,44 @@ TEST(EurocCalibration, KalibrsImuFileIsUnderstood) {
     EXPECT_EQ(imu.noise.rate_hz, 199);
     EXPECT_EQ(imu.T_s_body.t, Eigen::Vector3d(0, 0, 0));
   }
+}
+
+// MH_01's cam0 with three digits.
+const std::string kRounded =
+    "T_BS: {data: [0.015, -1.0, 0.004, -0.022, 1.0, 0.015, 0.026, -0.065, -0.026, 0.004, 1.0, "
+    "0.01, "
+    "0, 0, 0, 1]}\n";
+
+TEST(EurocCalibration, ARoundedRotationIsRepairedAndNamed) {
+  std::string lens = kLens + kRounded;
+  lens.replace(lens.find("  camera_model"), 2, "");
+  for (size_t at = 0; (at = lens.find("\n  ", at)) != std::string::npos;) {
+    lens.erase(at + 1, 2);
+  }
+  std::vector<std::string> warnings;
+  const CameraModel camera = ParseEurocCamera(lens, "sensor.yaml", &warnings);
+  EXPECT_THAT(warnings, ElementsAre(HasSubstr("sensor.yaml: the rotation in 'T_BS' is rounded")));
+  EXPECT_NEAR(camera.T_body_cam.q.norm(), 1, 1e-12);
+  Eigen::Matrix3d exact;
+  exact << 0.0148655429818, -0.999880929698, 0.00414029679422, 0.999557249008, 0.0149672133247,
+      0.025715529948, -0.0257744366974, 0.00375618835797, 0.999660727178;
+  EXPECT_LT(camera.T_body_cam.q.angularDistance(Eigen::Quaterniond(exact)), 1e-3);
+  ParseEurocCamera(kCamchain, "camchain.yaml", &(warnings = {}));
+  EXPECT_THAT(warnings, IsEmpty());
+}
+
+TEST(EurocCalibration, AMatrixThatIsNoRotationIsRefusedWithTheMend) {
+  const auto imu = [](const std::string& data) {
+    return Complaint([&] {
+      ParseEurocImuCalibration("rate_hz: 200\nT_BS: {data: [" + data + "]}\n", "imu.yaml");
+    });
+  };
+  EXPECT_THAT(imu("1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1"),
+              HasSubstr("is left-handed (det -1): one axis has the wrong sign"));
+  EXPECT_THAT(imu("0.98, 0.2, 0, 0, -0.2, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1"),
+              HasSubstr("columns must have length 1 and right angles; give at least three digits"));
+  EXPECT_THAT(imu("1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.1, 0, 0, 1"),
+              HasSubstr("is the matrix given column by column?"));
 }
 
 TEST(EurocCalibration, WhatALensModelLacksIsSaid) {
