@@ -301,13 +301,13 @@ def inverse_extrinsics(recording):
 
 
 def turned_camera(recording):
-    """The camera turned by 90 degrees about its optical axis."""
+    """The camera rotated by 90 degrees about its optical axis."""
     matrix = product(numbers(recording.camera_yaml, "data"), [0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1])
     recording.camera_yaml = put(recording.camera_yaml, "data", matrix)
 
 
 def backward_camera(recording):
-    """The camera turned by 180 degrees about the image's vertical."""
+    """The camera rotated by 180 degrees about the image's vertical."""
     matrix = product(numbers(recording.camera_yaml, "data"), [-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1])
     recording.camera_yaml = put(recording.camera_yaml, "data", matrix)
 

@@ -139,7 +139,9 @@ TEST_F(Access, AWorkerStoresResultsAndNothingElse) {
   SiteStreams worker(As("worker"), "hall");
   worker.ListenToStored(SiteStreams::Kind::kMatch);
   core.ListenToStored(SiteStreams::Kind::kResult);
+  // A round trip of each: what comes after it in the server comes after its subscription.
   EXPECT_TRUE(worker.AreThere());
+  EXPECT_TRUE(core.AreThere());
   Constraint result;
   result.from = {{1, 5}, 3};
   result.to = {{2, 6}, 4};

@@ -350,7 +350,7 @@ TEST_F(VioProcessTest, TheProgramFailsWhenNoPoseComesOfARecording) {
   for (int64_t utime = 0; utime < 2'000'000; utime += kImageStep_us / 2) {
     images += fmt::format("{0}000,{0}.png\n", utime);
     cv::imwrite((mav0 / fmt::format("cam0/data/{}.png", utime)).string(),
-                RandomTexture(320, 240, 3));
+                RandomTexture(320, 240, static_cast<uint64_t>(utime)));
   }
   WriteTextFile(mav0 / "imu0/data.csv", imu);
   WriteTextFile(mav0 / "cam0/data.csv", images);
