@@ -12,6 +12,7 @@
 #include "calibration/priors.h"
 #include "calibration/search.h"
 #include "calibration/solver.h"
+#include "core/axis_aligned.h"
 #include "core/rigid3.h"
 
 namespace pangea::calibration {

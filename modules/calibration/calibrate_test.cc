@@ -7,6 +7,7 @@
 
 #include "calibration/calibration_test_world.h"
 #include "calibration/search.h"
+#include "core/axis_aligned.h"
 #include "core/rigid3.h"
 
 namespace pangea::calibration {

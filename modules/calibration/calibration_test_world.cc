@@ -5,6 +5,7 @@
 #include <random>
 
 #include "calibration/search.h"
+#include "core/axis_aligned.h"
 #include "core/rigid3.h"
 
 namespace pangea::calibration {

@@ -6,7 +6,6 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "calibration/frame_pairs.h"
@@ -18,13 +17,6 @@ namespace pangea::calibration {
 constexpr double kMaxOffset_s = 0.15;  // search range, in both directions
 // velocity_change of the pairs for the search (epipolar.h); small, since they are short.
 constexpr double kSearchVelocityChange = 0.2;
-
-// Rotations camera to body.
-std::vector<Eigen::Quaterniond> AxisAlignedRotations();
-Eigen::Quaterniond NearestAxisAligned(const Eigen::Quaterniond& q_body_cam);
-// The body axes to which the image's right, its down and the optical axis point, by the nearest of
-// these rotations: "-y,-x,-z".
-std::string AxesOf(const Eigen::Quaterniond& q_body_cam);
 
 // Returns, for each rotation and field of view, the best time offset with its cost per residual;
 // the best first. `camera`: gives image size, lens model and read-out. `fields_of_view`: of the

@@ -9,6 +9,7 @@
 #include "calibration/parameters.h"
 #include "calibration/priors.h"
 #include "calibration/search.h"
+#include "core/axis_aligned.h"
 
 namespace pangea::calibration {
 namespace {

@@ -24,7 +24,7 @@
 namespace pangea::vio {
 namespace {
 
-constexpr int kNoPose = 2;  // exit code
+constexpr int kFewPoses = 2;  // exit code
 
 struct Arguments {
   std::string bus = kDefaultBusUrl;
@@ -75,13 +75,13 @@ double ParseRate(const std::string& rate) {
 
 // Prints the outcome and returns the exit code. Being stopped before the first pose is no failure.
 int Outcome(const VioProcess& process) {
-  const std::optional<std::string> why = process.NoPoseYet();
-  std::cerr << fmt::format("pangea-vio: {}\n", why ? "no pose: " + *why : process.Totals());
+  const std::optional<std::string> why = process.WhyFewPoses();
+  std::cerr << fmt::format("pangea-vio: {}\n", why ? *why : process.Totals());
   if (process.output_error()) {
     std::cerr << fmt::format("pangea-vio: {}\n", *process.output_error());
     return 1;
   }
-  return why && !StopRequested() ? kNoPose : 0;
+  return why && !StopRequested() ? kFewPoses : 0;
 }
 
 int Run(const Arguments& a, const LiveImuNoise& live_imu, const std::string& options_source) {
@@ -146,8 +146,8 @@ int RunCommandLine(int argc, char** argv) {
   OptionsArguments options(app);
   app.footer(fmt::format(
       "Exit code: 0; 1 when something could not be done; {} when a recording was played to its end "
-      "and gave no pose.",
-      kNoPose));
+      "and fewer than half of its images have a pose.",
+      kFewPoses));
   CLI11_PARSE(app, argc, argv);
   try {
     VioFileOptions file_options;

@@ -47,6 +47,7 @@ void Vio::OpenNewMap() {
     ++maps_opened_;
   }
   map_has_poses_ = false;
+  in_doubt_ = false;
   next_seq_ = 0;
   group_revision_ = 0;
   scale_sigma_.reset();
@@ -118,7 +119,8 @@ VioOutput Vio::AddRepeat(int64_t utime) {
 }
 
 VioOutput Vio::AddNewImage(int64_t utime, const cv::Mat& image) {
-  const TrackedFrame& frame = tracker_.Track(utime, image, RotationSinceNew(utime));
+  const TrackedFrame& frame = tracker_.Track(
+      utime, image, in_doubt_ ? std::nullopt : std::optional(RotationSinceNew(utime)));
   repeated_images_.NoteNew(image, frame);
   repeat_stamps_.AddNew(frame, std::bind_front(&Vio::CalibratedRotation, this));
   gyro_rotation_.ForgetUntil(
@@ -177,6 +179,8 @@ VioOutput Vio::Estimate(const TrackedFrame& frame, const cv::Mat& image,
   output.utime = frame.utime;
   output.state = result.state;
   output.reason = result.reason;
+  output.suspect = result.suspect;
+  in_doubt_ = result.in_doubt;
   output.map = map_;
   output.T_odom_body = result.T_odom_body;
   output.v_odom_body = result.v_odom_body;

@@ -43,7 +43,8 @@ struct VioOptions {
 struct VioOutput {
   int64_t utime = 0;  // of the image
   EstimatorState state = EstimatorState::kInitialising;
-  std::string reason;  // why it is not tracking
+  std::string reason;   // why it is not tracking
+  std::string suspect;  // what is probably wrong with the calibration; empty: not known
   // The image is a copy of the last new one (repeated_images.h): it has no pose, and neither have
   // the values below.
   bool repeats = false;
@@ -126,6 +127,7 @@ class Vio {
   std::optional<Estimator> estimator_;
   MapId map_;
   bool map_has_poses_ = false;
+  bool in_doubt_ = false;  // whether the gyro's rotations are right for the camera
   int maps_opened_ = 0;
   int32_t next_seq_ = 0;
   int64_t group_revision_ = 0;

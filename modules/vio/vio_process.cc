@@ -37,6 +37,11 @@ std::string UnknownScale(const std::optional<double>& sigma) {
              : "";
 }
 
+std::string WithSuspect(const VioOutput& output) {
+  return output.suspect.empty() ? output.reason
+                                : fmt::format("{}; probably {}", output.reason, output.suspect);
+}
+
 int8_t ToMessage(EstimatorState state) {
   switch (state) {
     case EstimatorState::kInitialising:
@@ -114,9 +119,11 @@ void VioProcess::Handle(const VioOutput& output) {
     first_image_utime_ = output.utime;
   }
   const bool tracking = output.state == EstimatorState::kTracking;
-  ++num_images_;
-  num_poses_ += tracking ? 1 : 0;
-  why_not_tracking_ = output.reason;
+  if (tracking) {
+    pose_count_.AddPose(output.utime);
+  } else {
+    pose_count_.AddNone(output.utime, output.reason, output.suspect);
+  }
   node_.Count("frames");
   node_.Set("maps", vio_->maps_opened());
   node_.Set("tracked", output.num_tracked);
@@ -137,7 +144,7 @@ void VioProcess::Handle(const VioOutput& output) {
       tracking
           ? "tracking"
           : fmt::format("{}: {}", output.state == EstimatorState::kLost ? "lost" : "initialising",
-                        output.reason);
+                        WithSuspect(output));
   if (output.state == EstimatorState::kLost) {
     node_.Count("lost");
   }
@@ -182,7 +189,7 @@ void VioProcess::PublishPose(const VioOutput& output) {
   pose_t message{};
   message.utime = output.utime;
   message.state = ToMessage(output.state);
-  message.reason = output.state == EstimatorState::kTracking ? doubt_ : output.reason;
+  message.reason = output.state == EstimatorState::kTracking ? doubt_ : WithSuspect(output);
   message.map = pangea::ToMessage(output.map);
   message.T_odom_body = pangea::ToMessage(output.T_odom_body);
   message.v_odom_body = pangea::ToMessage(output.v_odom_body);
@@ -231,9 +238,10 @@ void VioProcess::NoteTumFailure() {
 }
 
 std::string VioProcess::Totals() const {
-  std::string text = fmt::format("agent {}: {} of {} images have a pose; {} keyframes in {} map{}",
-                                 options_.agent_id, num_poses_, num_images_, num_keyframes_,
-                                 vio_->maps_opened(), vio_->maps_opened() == 1 ? "" : "s");
+  std::string text =
+      fmt::format("agent {}: {} of {} images have a pose; {} keyframes in {} map{}",
+                  options_.agent_id, pose_count_.poses(), pose_count_.images(), num_keyframes_,
+                  vio_->maps_opened(), vio_->maps_opened() == 1 ? "" : "s");
   if (tum_files_ > 1) {
     text += fmt::format("; the last of {} TUM files is {}", tum_files_, tum_file_);
   }
@@ -251,16 +259,12 @@ std::string VioProcess::Totals() const {
   return text;
 }
 
-std::optional<std::string> VioProcess::NoPoseYet() const {
-  if (num_poses_ > 0) {
-    return std::nullopt;
+std::optional<std::string> VioProcess::WhyFewPoses() const {
+  if (pose_count_.images() > 0) {
+    return pose_count_.WhyFew();
   }
-  if (num_images_ == 0) {
-    return "no image came to the odometry" +
-           (why_refused_.empty() ? "" : " that could be used; the last one: " + why_refused_);
-  }
-  return fmt::format("the odometry did not start in {} images; at the last: {}", num_images_,
-                     why_not_tracking_);
+  return "no pose: no image came to the odometry" +
+         (why_refused_.empty() ? "" : " that could be used; the last one: " + why_refused_);
 }
 
 void VioProcess::StartAnew() {
@@ -316,7 +320,7 @@ std::string VioProcess::LagText(int64_t lag_us) const {
 void VioProcess::RefuseImage(const std::string& why) {
   node_.Refuse("image: " + why);
   why_refused_ = why;
-  if (num_images_ == 0) {
+  if (pose_count_.images() == 0) {
     state_text_ = "waiting for images that can be used; the last one: " + why;
   }
 }
@@ -340,7 +344,7 @@ void VioProcess::TellLag(int64_t now_utime) {
   std::cerr << fmt::format(
                    "pangea-vio: agent {} cannot keep up: {} of {}; fewer or smaller images, or a "
                    "quicker machine\n",
-                   options_.agent_id, LagText(largest_lag_us_), num_images_ + num_dropped_)
+                   options_.agent_id, LagText(largest_lag_us_), pose_count_.images() + num_dropped_)
             << std::flush;
   largest_lag_us_ = 0;
 }

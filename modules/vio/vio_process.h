@@ -23,6 +23,7 @@
 #include "vio/imu/saturation.h"
 #include "vio/live/map_localisation.h"
 #include "vio/live/shown_pose.h"
+#include "vio/pose_count.h"
 #include "vio/vio.h"
 
 namespace lcm {
@@ -77,8 +78,8 @@ class VioProcess : public Process {
   void Flush();
   // A summary of all images so far, for people.
   std::string Totals() const;
-  // Why no image has given a pose so far; empty once one has.
-  std::optional<std::string> NoPoseYet() const;
+  // Why few or no images have given a pose so far (pose_count.h); empty if enough have.
+  std::optional<std::string> WhyFewPoses() const;
   // Why the file of poses is incomplete (for instance a full disk); the odometry goes on without
   // it.
   const std::optional<std::string>& output_error() const { return output_error_; }
@@ -117,15 +118,13 @@ class VioProcess : public Process {
   OptionsAnnouncer announcer_;
   std::optional<int64_t> first_image_utime_;
   std::string state_text_ = "waiting for images";
-  std::string why_refused_;       // the newest refused image
-  std::string doubt_;             // a warning while tracking
-  std::string why_not_tracking_;  // at the newest image
+  std::string why_refused_;  // the newest refused image
+  std::string doubt_;        // a warning while tracking
   SaturationDetector saturation_;
   bool saturated_ = false;     // in the samples of the newest image
   int64_t num_saturated_ = 0;  // samples
-  int64_t num_images_ = 0;
-  int64_t num_repeated_ = 0;  // images; not in num_images_
-  int64_t num_poses_ = 0;
+  PoseCount pose_count_;       // without images that repeat
+  int64_t num_repeated_ = 0;   // images
   int64_t num_keyframes_ = 0;
   int64_t lag_us_ = 0;
   int64_t largest_lag_us_ = 0;  // since the last message on stderr

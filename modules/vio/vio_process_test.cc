@@ -272,7 +272,7 @@ TEST_F(VioProcessTest, AFullDiskIsSaidAndTheOdometryGoesOn) {
 
 TEST_F(VioProcessTest, SaysWhyThereIsNoPose) {
   VioProcess process(bus_, options_, 0);
-  EXPECT_EQ(process.NoPoseYet(), "no image came to the odometry");
+  EXPECT_EQ(process.WhyFewPoses(), "no pose: no image came to the odometry");
   process.Open(world_.camera(), ImuNoise{});
   const cv::Mat image = RandomTexture(752, 480, 11);
   for (int64_t utime = 0; utime < 3'000'000; utime += kImageStep_us) {
@@ -282,9 +282,10 @@ TEST_F(VioProcessTest, SaysWhyThereIsNoPose) {
     }
     process.AddTracks(world_.Frame(utime), image, imu);
   }
-  EXPECT_EQ(process.NoPoseYet(),
-            "the odometry did not start in 30 images; at the last: the accelerometer shows 0.00 "
-            "m/s^2 on average, where gravity is 9.8");
+  EXPECT_EQ(
+      process.WhyFewPoses(),
+      "no pose: the odometry did not start in 30 images; at the last: the accelerometer shows "
+      "0.00 m/s^2 on average, where gravity is 9.8");
 }
 
 TEST_F(VioProcessTest, SaysThatTheImuIsAtTheEndOfItsRange) {
@@ -323,8 +324,28 @@ TEST_F(VioProcessTest, AGyroscopeInDegreesIsNamed) {
     }
     process.AddTracks(world_.Frame(utime), image, imu);
   }
-  EXPECT_THAT(*process.NoPoseYet(),
+  EXPECT_THAT(*process.WhyFewPoses(),
               ::testing::HasSubstr("20.0 rad/s on average: is it in degrees"));
+}
+
+TEST_F(VioProcessTest, AWrongSignIsNamedWithTheMend) {
+  VioProcess process(bus_, options_, 0);
+  process.Open(world_.camera(), ImuNoise{});
+  const cv::Mat image = RandomTexture(752, 480, 11);
+  for (int64_t utime = 0; utime < 8'000'000; utime += kImageStep_us) {
+    std::vector<ImuSample> imu;
+    for (; next_imu_ <= utime; next_imu_ += kImuStep_us) {
+      imu.push_back(World::Sample(next_imu_));
+      imu.back().accel *= -1;
+    }
+    process.AddTracks(world_.Frame(utime), image, imu);
+  }
+  const char mend[] =
+      "robably the accelerometer's sign is wrong: at rest it has to show +9.8 m/s^2 upwards, so "
+      "negate its three axes";
+  EXPECT_THAT(*process.WhyFewPoses(), ::testing::HasSubstr(mend));
+  bus_.Drain();
+  EXPECT_THAT(poses_.back().reason, ::testing::HasSubstr(mend));
 }
 
 // The output for a recording of a dead sensor.

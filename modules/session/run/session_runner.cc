@@ -37,7 +37,7 @@ constexpr double kQuiet_s = 2.5;
 constexpr double kStopGrace_s = 5;
 constexpr size_t kFilesPerBus = 8;  // of which LCM opens six
 constexpr size_t kFilesBeside = 64;
-constexpr int kNoPose = 2;  // exit code of pangea-vio: its recording gave no pose
+constexpr int kFewPoses = 2;  // exit code of pangea-vio: its recording gave few or no poses
 
 class Runner {
  public:
@@ -243,7 +243,7 @@ class Runner {
       return;
     }
     // The rest of the recording after a killed vio may be too short for an initialisation.
-    const bool is_rest = player.restarts > 0 && exit->code == kNoPose;
+    const bool is_rest = player.restarts > 0 && exit->code == kFewPoses;
     if (exit->code == 0 || is_rest || player.is_told_to_end || StopRequested()) {
       player.ended_s = Now();
     } else if (exit->signal != 0 && player.restarts < KeptProcesses::kMaxRestarts) {

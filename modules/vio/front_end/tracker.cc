@@ -65,13 +65,15 @@ void Tracker::Drop(const std::vector<int32_t>& landmark_ids) {
 }
 
 const TrackedFrame& Tracker::Track(int64_t utime, const cv::Mat& image,
-                                   const Eigen::Quaterniond& q_cam_lastcam) {
+                                   const std::optional<Eigen::Quaterniond>& q_cam_lastcam) {
   statistics_ = {};
   Prepare(image);
   if (!features_.empty()) {
     const std::vector<Bearing> before = Bearings();
-    TrackFeatures(image, q_cam_lastcam, 1e-6F * static_cast<float>(utime - frame_.utime));
-    RejectOutliers(q_cam_lastcam, before);
+    TrackFeatures(image, q_cam_lastcam.value_or(Eigen::Quaterniond::Identity()),
+                  1e-6F * static_cast<float>(utime - frame_.utime));
+    KeepApart(q_cam_lastcam ? Inliers(*q_cam_lastcam, before)
+                            : std::vector<bool>(features_.size(), true));
   }
   statistics_.tracked = static_cast<int>(features_.size());
   AddFeatures();
@@ -241,8 +243,8 @@ void Tracker::TakePatches(const cv::Mat& image) {
   }
 }
 
-void Tracker::RejectOutliers(const Eigen::Quaterniond& q_cam_lastcam,
-                             const std::vector<Bearing>& before) {
+std::vector<bool> Tracker::Inliers(const Eigen::Quaterniond& q_cam_lastcam,
+                                   const std::vector<Bearing>& before) const {
   std::vector<Eigen::Vector2d> rays_before, rays_now;
   size_t at = 0;
   for (const Feature& feature : features_) {
@@ -252,16 +254,19 @@ void Tracker::RejectOutliers(const Eigen::Quaterniond& q_cam_lastcam,
     rays_before.push_back(before[at].ray);
     rays_now.push_back(feature.ray);
   }
-  const TwoViewResult check =
-      CheckTwoView(rays_before, rays_now, q_cam_lastcam, camera_.PixelAngle(), options_.two_view);
-  // Of two features that have come too close, the older one stays.
+  return CheckTwoView(rays_before, rays_now, q_cam_lastcam, camera_.PixelAngle(), options_.two_view)
+      .inlier;
+}
+
+// Keeps the inliers. Of two features that have come too close, the older one stays.
+void Tracker::KeepApart(const std::vector<bool>& inlier) {
   const double merge_px = kMergeShare * options_.min_distance_px;
   std::vector<Feature> kept;
   for (size_t i = 0; i < features_.size(); ++i) {
     const bool merged = std::any_of(kept.begin(), kept.end(), [&](const Feature& other) {
       return Nearer(other.pixel, features_[i].pixel, merge_px);
     });
-    if (check.inlier[i] && !merged) {
+    if (inlier[i] && !merged) {
       kept.push_back(std::move(features_[i]));
     } else {
       ++statistics_.lost_two_view;

@@ -43,9 +43,10 @@ class Tracker {
  public:
   Tracker(const CameraModel& camera, const TrackerOptions& options);
 
-  // `q_cam_lastcam` maps directions from the previous image's camera frame to this one's.
+  // `q_cam_lastcam` maps directions from the previous image's camera frame to this one's. Without
+  // it no outliers between the two views are found.
   const TrackedFrame& Track(int64_t utime, const cv::Mat& image,
-                            const Eigen::Quaterniond& q_cam_lastcam);
+                            const std::optional<Eigen::Quaterniond>& q_cam_lastcam);
   // Ends these tracks; the estimator calls them outliers.
   void Drop(const std::vector<int32_t>& landmark_ids);
   // Forgets all tracks; ids start again at 0 (a new map).
@@ -93,7 +94,9 @@ class Tracker {
                   std::vector<Found>* found);
   void TrackFeatures(const cv::Mat& image, const Eigen::Quaterniond& q_cam_lastcam, float dt_s);
   void TakePatches(const cv::Mat& image);
-  void RejectOutliers(const Eigen::Quaterniond& q_cam_lastcam, const std::vector<Bearing>& before);
+  std::vector<bool> Inliers(const Eigen::Quaterniond& q_cam_lastcam,
+                            const std::vector<Bearing>& before) const;
+  void KeepApart(const std::vector<bool>& inlier);
   // Examines only the cells whose turn it is; the strongest corner first.
   std::vector<RatedCorner> CornersOfEmptyCells() const;
   void AddFeatures();

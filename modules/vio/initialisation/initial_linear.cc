@@ -269,6 +269,15 @@ std::optional<Vector3d> SolveGyroBias(std::span<const StartFrame> frames, const 
   return FindBias(pairs, Vector3d::Zero(), 0.05).bias;
 }
 
+std::optional<double> GyroCost(std::span<const StartFrame> frames, const Rigid3& T_body_cam,
+                               const ImuNoise& noise) {
+  const std::vector<RotationPair> pairs = MakePairs(frames, T_body_cam, noise);
+  if (pairs.size() < kMinPairs) {
+    return std::nullopt;
+  }
+  return FindBias(pairs, Vector3d::Zero(), 0.05).cost / static_cast<double>(pairs.size());
+}
+
 std::optional<double> SolveTimeOffset(std::span<const StartFrame> frames, const Rigid3& T_body_cam,
                                       std::span<const ImuSample> samples, const ImuNoise& noise) {
   const auto max_us = static_cast<int64_t>(1e6 * kMaxTimeOffset_s);

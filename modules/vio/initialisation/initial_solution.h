@@ -29,6 +29,11 @@ struct StartFrame {
 std::optional<Eigen::Vector3d> SolveGyroBias(std::span<const StartFrame> frames,
                                              const Rigid3& T_body_cam, const ImuNoise& noise);
 
+// How badly the gyro's rotations satisfy the epipolar constraints with that bias: the mean of the
+// pairs' residuals, as angles (radians). Empty if there are too few tracks.
+std::optional<double> GyroCost(std::span<const StartFrame> frames, const Rigid3& T_body_cam,
+                               const ImuNoise& noise);
+
 // Time by which the images were taken later than their stamps say (seconds, IMU clock), from
 // rotations alone: the offset at which the gyro's rotations satisfy the epipolar constraints best.
 // `samples` must span the frames and some time around them. Empty if the rotation rate does not

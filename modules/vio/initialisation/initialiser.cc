@@ -11,6 +11,7 @@
 #include "core/median.h"
 #include "vio/imu/imu_buffer.h"
 #include "vio/imu/imu_noise.h"
+#include "vio/initialisation/calibration_faults.h"
 #include "vio/initialisation/initial_solution.h"
 
 namespace pangea::vio {
@@ -48,6 +49,13 @@ constexpr double kMaxSpeedShare = 0.03;     // of the speed: 0.05 m/s at a typic
 constexpr double kMaxTiltSigma = 0.035;     // rad
 constexpr double kMaxRmsSigmas = 1.8;
 constexpr double kMaxAccelBias = 0.8 / 0.15;  // of accel_bias_sigma
+
+// Attempts without success after which the calibration is doubted. With a wrong one each attempt
+// takes long, so there are fewer of them from then on. After kSearching of them usual mistakes are
+// looked for, and again each time that so many more have failed.
+constexpr int kDoubtful = 5;
+constexpr int kSearching = 8;
+constexpr double kDoubtfulInterval_s = 0.8;
 
 double MedianDisplacement(const TrackedFrame& a, const TrackedFrame& b, size_t* shared) {
   std::vector<double> displacement;
@@ -153,7 +161,44 @@ InitialResult Initialiser::Try() {
   if (auto stationary = TryStationary()) {
     return {stationary, ""};
   }
-  return TryMoving();
+  const int64_t now = frames_.back().utime;
+  if (InDoubt() && SpanSeconds(last_attempt_utime_, now) < kDoubtfulInterval_s) {
+    return {std::nullopt, why_not_, false, suspect_};
+  }
+  last_attempt_utime_ = now;
+  InitialResult result = TryMoving();
+  NoteOutcome(result);
+  result.suspect = suspect_;
+  return result;
+}
+
+bool Initialiser::InDoubt() const { return contradictions_ >= kDoubtful; }
+
+void Initialiser::NoteOutcome(const InitialResult& result) {
+  contradictions_ = std::max(0, contradictions_ + (result.contradicts ? 1 : -1));
+  if (contradictions_ == kSearching || !possible_fault_.empty()) {
+    contradictions_ = kDoubtful;
+    LookForFaults();
+  }
+}
+
+// Names a mistake if the odometry would start without it, at two attempts.
+void Initialiser::LookForFaults() {
+  const std::vector<StartFrame> frames = StartFrames(0);
+  std::vector<CalibrationFault> faults{NegatedAccelerometer(camera_)};
+  if (auto by_rotations = FaultByRotations(frames, camera_, noise_)) {
+    faults = {std::move(*by_rotations)};
+  }
+  const CalibrationFault& fault = faults.front();
+  std::string found;
+  if (TryMoving(WithoutFault(frames, fault), fault.T_body_cam).state) {
+    found = fault.text;
+  }
+  if (!found.empty() && found == possible_fault_) {
+    suspect_ = std::exchange(possible_fault_, "");
+  } else {
+    possible_fault_ = found;
+  }
 }
 
 std::optional<InitialState> Initialiser::TryStationary() const {
@@ -194,8 +239,8 @@ std::optional<InitialState> Initialiser::TryStationary() const {
   return state;
 }
 
-std::vector<StartFrame> Initialiser::StartFrames() const {
-  const int64_t shift = std::llround(1e6 * time_offset_change_s_);
+std::vector<StartFrame> Initialiser::StartFrames(double shift_s) const {
+  const int64_t shift = std::llround(1e6 * shift_s);
   ImuBuffer samples(noise_);
   samples.Add(samples_);
   std::vector<StartFrame> frames;
@@ -215,8 +260,8 @@ std::vector<StartFrame> Initialiser::StartFrames() const {
 }
 
 InitialResult Initialiser::TryMoving() {
-  const std::vector<StartFrame> frames = StartFrames();
-  InitialResult result = TryMoving(frames);
+  const std::vector<StartFrame> frames = StartFrames(time_offset_change_s_);
+  InitialResult result = TryMoving(frames, camera_.T_body_cam);
   if (result.state || !result.contradicts) {
     return result;
   }
@@ -227,7 +272,7 @@ InitialResult Initialiser::TryMoving() {
   }
   time_offset_change_s_ += *offset;
   DropImagesBeforeSamples();
-  return TryMoving(StartFrames());
+  return TryMoving(StartFrames(time_offset_change_s_), camera_.T_body_cam);
 }
 
 // Empty if the start is good.
@@ -253,23 +298,24 @@ std::optional<InitialResult> Initialiser::Refusal(
                     refined->velocity_sigma, refined->tilt_sigma * 57.3)};
   }
   if (refined->states.back().accel_bias.norm() > kMaxAccelBias * sigmas_.accel_bias) {
-    return InitialResult{std::nullopt, "the start needs an implausible accelerometer bias"};
+    return InitialResult{std::nullopt, "the start needs an implausible accelerometer bias", true};
   }
   return std::nullopt;
 }
 
-InitialResult Initialiser::TryMoving(const std::vector<StartFrame>& frames) const {
-  const auto gyro_bias = SolveGyroBias(frames, camera_.T_body_cam, noise_);
+InitialResult Initialiser::TryMoving(const std::vector<StartFrame>& frames,
+                                     const Rigid3& T_body_cam) const {
+  const auto gyro_bias = SolveGyroBias(frames, T_body_cam, noise_);
   if (!gyro_bias) {
-    return {std::nullopt, "too few features are tracked from image to image"};
+    return {std::nullopt, "too few features are tracked from image to image", true};
   }
-  auto linear = SolveLinear(frames, camera_.T_body_cam, noise_, *gyro_bias);
+  auto linear = SolveLinear(frames, T_body_cam, noise_, *gyro_bias);
   if (!linear) {
     return {std::nullopt, "the motion does not determine velocity and gravity yet"};
   }
   const ImuNoise noise = MeasuredNoise(noise_, samples_);
   const auto refine = [&](const LinearStart& start) {
-    return Refine(frames, camera_.T_body_cam, noise, *gyro_bias, start, sigmas_);
+    return Refine(frames, T_body_cam, noise, *gyro_bias, start, sigmas_);
   };
   std::optional<RefinedStart> refined = RefineInFront(refine, &*linear);
   if (auto refusal = Refusal(refined)) {

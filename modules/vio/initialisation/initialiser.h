@@ -7,6 +7,8 @@
 // al., CVPR 2023); then velocity and gravity in closed form with known |g| (Dong-Si & Mourikis,
 // IROS 2012); then bundle adjustment with preintegrated IMU. A solution that is poorly determined,
 // or does not explain the images, is refused with a reason: a bad start is worse than a late one.
+// When images and IMU go on not to fit, usual mistakes in the calibration are looked for
+// (calibration_faults.h).
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -46,6 +48,7 @@ struct InitialResult {
   std::optional<InitialState> state;
   std::string reason;        // why there is no state yet
   bool contradicts = false;  // the reason is that images and IMU do not fit
+  std::string suspect = {};  // what is probably wrong with the calibration; empty: not known
 };
 
 class Initialiser {
@@ -58,15 +61,19 @@ class Initialiser {
   // at or after the frame. `stamp_sigma_s`: present estimate for the frames' stamps; 0: exact.
   InitialResult AddFrame(const TrackedFrame& frame, std::span<const ImuSample> imu,
                          double stamp_sigma_s);
+  // Images and IMU have not fitted for a while: the gyro's rotations may be wrong for the camera.
+  bool InDoubt() const;
 
  private:
   void DropImagesBeforeSamples();
   InitialResult Try();
   std::optional<InitialState> TryStationary() const;
   InitialResult TryMoving();
-  InitialResult TryMoving(const std::vector<StartFrame>& frames) const;
+  InitialResult TryMoving(const std::vector<StartFrame>& frames, const Rigid3& T_body_cam) const;
+  void NoteOutcome(const InitialResult& result);
+  void LookForFaults();
   std::optional<InitialResult> Refusal(const std::optional<RefinedStart>& refined) const;
-  std::vector<StartFrame> StartFrames() const;
+  std::vector<StartFrame> StartFrames(double shift_s) const;
 
   CameraModel camera_;
   ImuNoise noise_;
@@ -77,6 +84,10 @@ class Initialiser {
   std::vector<ImuSample> samples_;  // from before the oldest frame to after the newest
   double time_offset_change_s_ = 0;
   std::string why_not_ = "collecting images";  // result of the newest attempt
+  int contradictions_ = 0;          // attempts at which images and IMU did not fit, less the others
+  int64_t last_attempt_utime_ = 0;  // at a moving start
+  std::string possible_fault_;      // found once
+  std::string suspect_;             // found twice
 };
 
 }  // namespace pangea::vio

@@ -68,8 +68,8 @@ struct Estimator::Impl {
   FrameResult AddFrame(const TrackedFrame& frame, std::span<const ImuSample> imu);
   std::vector<FinishedKeyframe> Flush();
 
-  // Returns the reason if the estimator has not started with this frame.
-  std::optional<std::string> TryStart(const TrackedFrame& frame, std::span<const ImuSample> imu);
+  // Says why in the result, if the estimator has not started with this frame.
+  void TryStart(const TrackedFrame& frame, std::span<const ImuSample> imu, FrameResult* result);
   // Returns the reason if the estimator is lost.
   std::optional<std::string> Track(const TrackedFrame& frame, FrameResult* result);
   // A gap in images or samples over which the window cannot be continued.
@@ -291,19 +291,21 @@ void Estimator::Impl::MarginaliseLandmarks(int frame) {
   });
 }
 
-std::optional<std::string> Estimator::Impl::TryStart(const TrackedFrame& frame,
-                                                     std::span<const ImuSample> imu) {
+void Estimator::Impl::TryStart(const TrackedFrame& frame, std::span<const ImuSample> imu,
+                               FrameResult* result) {
   imu_samples.Forget(ImuTime(frame.utime) - kStartSpan_us);
   TrackedFrame shifted = frame;  // the initialiser works on the IMU's clock
   shifted.utime = ImuTime(frame.utime);
   const InitialResult initial = initialiser.AddFrame(shifted, imu, stamps.sigma_s());
   if (!initial.state) {
-    return initial.reason;
+    result->reason = initial.reason;
+    result->suspect = initial.suspect;
+    result->in_doubt = initialiser.InDoubt();
+    return;
   }
   Start(*initial.state);
   stamps.SetReference();
   Solve(kStartIterations);
-  return std::nullopt;
 }
 
 std::optional<std::string> Estimator::Impl::GapBefore(const TrackedFrame& frame) {
@@ -347,8 +349,10 @@ FrameResult Estimator::Impl::AddFrame(const TrackedFrame& frame, std::span<const
   std::optional<std::string> wrong;
   if (started) {
     wrong = Track(frame, &result);
-  } else if (const auto why_not = TryStart(frame, imu)) {
-    result.reason = *why_not;
+  } else {
+    TryStart(frame, imu, &result);
+  }
+  if (!started) {
     return result;
   }
   if (!wrong) {

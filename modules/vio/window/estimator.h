@@ -93,7 +93,10 @@ struct FinishedKeyframe {
 
 struct FrameResult {
   EstimatorState state = EstimatorState::kInitialising;
-  std::string reason;  // why it is not tracking
+  std::string reason;   // why it is not tracking
+  std::string suspect;  // what is probably wrong with the calibration (initialiser.h)
+  // Before the start, images and IMU have not fitted for a while.
+  bool in_doubt = false;
   Rigid3 T_odom_body;  // at this frame; valid if state is kTracking
   Eigen::Vector3d v_odom_body = Eigen::Vector3d::Zero();
   BodyMotion motion;  // from there on

@@ -1,0 +1,119 @@
+// Tests that usual mistakes in a calibration are found, each with its mend.
+
+#include "vio/initialisation/calibration_faults.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/axis_aligned.h"
+#include "vio/initialisation/start_test_world.h"
+
+namespace pangea::vio {
+namespace {
+
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+class CalibrationFaults : public ::testing::Test {
+ protected:
+  CalibrationFaults() {
+    camera_.fx = camera_.fy = 400;
+    camera_.T_body_cam = kT_body_cam;
+  }
+  std::optional<CalibrationFault> Find() const {
+    return FaultByRotations(frames_, camera_, ImuNoise{});
+  }
+  // Makes the frames as if each sample were as `change` says.
+  template <typename Change>
+  void ChangeSamples(Change change) {
+    for (StartFrame& frame : frames_) {
+      for (ImuSample& sample : frame.imu) {
+        change(sample);
+      }
+    }
+  }
+
+  std::vector<StartFrame> frames_ = Record(Lively, 0, kStartRaySigma).frames;
+  CameraModel camera_;
+};
+
+TEST_F(CalibrationFaults, ARightCalibrationHasNone) { EXPECT_FALSE(Find()); }
+
+TEST_F(CalibrationFaults, TheNegatedAccelerometerIsNoMatterOfRotations) {
+  ChangeSamples([](ImuSample& sample) { sample.accel *= -1; });
+  EXPECT_FALSE(Find());
+  const auto mended = WithoutFault(frames_, NegatedAccelerometer(camera_));
+  EXPECT_GT(mended[1].imu[0].accel.z(), 5);
+}
+
+TEST_F(CalibrationFaults, FindsTheInverse) {
+  camera_.T_body_cam = kT_body_cam.Inverse();
+  const auto fault = Find();
+  ASSERT_TRUE(fault);
+  EXPECT_THAT(fault->text, HasSubstr("T_body_cam) is the inverse"));
+  EXPECT_LT(fault->T_body_cam.q.angularDistance(kT_body_cam.q), 1e-9);
+  EXPECT_LT((fault->T_body_cam.t - kT_body_cam.t).norm(), 1e-9);
+}
+
+TEST_F(CalibrationFaults, FindsANegatedGyroscope) {
+  ChangeSamples([](ImuSample& sample) { sample.gyro *= -1; });
+  const auto fault = Find();
+  ASSERT_TRUE(fault);
+  EXPECT_THAT(fault->text, StartsWith("the gyroscope's sign is wrong: negate"));
+  EXPECT_GT(WithoutFault(frames_, *fault)[1].imu[0].accel.z(), 5) << "the accelerometer is right";
+}
+
+// The grid is coarse: it tells the direction and the size.
+TEST_F(CalibrationFaults, FindsAFocalLengthThatIsFarOff) {
+  for (const double wrong : {0.65, 1.4, 2.0}) {
+    frames_ = Record(Lively, 0, kStartRaySigma).frames;
+    for (StartFrame& frame : frames_) {
+      for (auto& [id, ray] : frame.rays) {
+        ray /= wrong;
+      }
+    }
+    const auto fault = Find();
+    ASSERT_TRUE(fault) << wrong;
+    EXPECT_THAT(fault->text, StartsWith("the focal length is wrong: fx is 400 px")) << wrong;
+    EXPECT_NEAR(fault->focal_factor * wrong, 1, 0.2) << wrong;
+  }
+}
+
+TEST_F(CalibrationFaults, FindsWrongAxesOfTheCamera) {
+  for (const Quaterniond& rotation : AxisAlignedRotations()) {
+    if (rotation.angularDistance(Quaterniond::Identity()) < 0.1) {
+      continue;
+    }
+    camera_.T_body_cam.q = kT_body_cam.q * rotation;
+    const auto fault = Find();
+    ASSERT_TRUE(fault) << AxesOf(rotation);
+    EXPECT_LT(fault->T_body_cam.q.angularDistance(kT_body_cam.q), 0.2) << fault->text;
+  }
+}
+
+// A tilted camera: axes of the IMU and of the camera differ.
+TEST_F(CalibrationFaults, FindsWrongAxesOfTheImu) {
+  const Quaterniond tilt = ExpSo3({0.3, 0.6, -0.2});
+  const Quaterniond wrong(Eigen::AngleAxisd(M_PI / 2, Vector3d::UnitZ()));
+  camera_.T_body_cam.q = tilt * kT_body_cam.q;
+  ChangeSamples([&](ImuSample& sample) {
+    sample.gyro = wrong * (tilt * sample.gyro);
+    sample.accel = wrong * (tilt * sample.accel);
+  });
+  const auto fault = Find();
+  ASSERT_TRUE(fault);
+  EXPECT_THAT(fault->text, HasSubstr("become the body's -y,x,z"));
+  EXPECT_LT(fault->T_body_cam.q.angularDistance(wrong * camera_.T_body_cam.q), 1e-9);
+}
+
+TEST_F(CalibrationFaults, SaysNothingWithoutTracks) {
+  for (StartFrame& frame : frames_) {
+    frame.rays.clear();
+  }
+  EXPECT_FALSE(Find());
+}
+
+}  // namespace
+}  // namespace pangea::vio
