@@ -3,8 +3,12 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
+#include <cmath>
+#include <limits>
+#include <utility>
 
 #include "core/axis_aligned.h"
+#include "core/rigid3.h"
 
 namespace pangea::vio {
 namespace {
@@ -14,50 +18,50 @@ using Eigen::Quaterniond;
 // A mistake is named only if the cost without it is below this share of the cost as given.
 constexpr double kFaultShare = 0.6;
 constexpr double kFocalFactors[] = {0.5, 0.6, 0.72, 0.85, 1.18, 1.4, 1.7, 2};
+constexpr double kFocalStep = 0.09;  // half of the step between these
+constexpr double kSameAngle_rad = 0.1;
+constexpr double kFocalAccuracy = 0.01;  // relative
 
-CalibrationFault AsGiven(const CameraModel& camera) {
-  return {.text = {}, .T_body_cam = camera.T_body_cam};
-}
-
-CalibrationFault InverseExtrinsics(const CameraModel& camera) {
-  return {.text =
-              "T_BS (T_body_cam) is the inverse of the right one: it takes coordinates in the "
-              "camera to the body, so invert it",
-          .T_body_cam = camera.T_body_cam.Inverse()};
+CalibrationFault InverseExtrinsics(CameraModel camera) {
+  camera.T_body_cam = camera.T_body_cam.Inverse();
+  return {
+      "T_BS (T_body_cam) is the inverse of the right one: it takes coordinates in the camera to "
+      "the body, so invert it",
+      camera};
 }
 
 CalibrationFault NegatedGyroscope(const CameraModel& camera) {
-  CalibrationFault fault = AsGiven(camera);
-  fault.text = "the gyroscope's sign is wrong: negate its three axes";
-  fault.gyro_sign = -1;
-  return fault;
+  return {.text = "the gyroscope's sign is wrong: negate its three axes",
+          .camera = camera,
+          .gyro_sign = -1};
 }
 
-CalibrationFault WrongFocalLength(const CameraModel& camera, double factor) {
-  CalibrationFault fault = AsGiven(camera);
-  fault.text = fmt::format(
+CalibrationFault WrongFocalLength(CameraModel camera, double factor) {
+  const std::string text = fmt::format(
       "the focal length is wrong: fx is {:.0f} px, and about {:.0f} px fits; calibrate the camera, "
       "and check that the intrinsics are of this image size",
       camera.fx, factor * camera.fx);
-  fault.focal_factor = factor;
-  return fault;
+  camera.fx *= factor;
+  camera.fy *= factor;
+  return {text, camera};
 }
 
-CalibrationFault WrongCameraAxes(const CameraModel& camera, const Quaterniond& rotation) {
-  const Rigid3& T = camera.T_body_cam;
-  const Quaterniond right = (T.q * rotation).normalized();
-  return {.text = fmt::format(
-              "the rotation of T_BS (T_body_cam) is wrong: the image's right, its down and the "
-              "optical axis point along the body's {}, and {} fits",
-              AxesOf(T.q), AxesOf(right)),
-          .T_body_cam = {right, T.t}};
+CalibrationFault WrongCameraAxes(CameraModel camera, const Quaterniond& rotation) {
+  const std::string given = AxesOf(camera.T_body_cam.q);
+  camera.T_body_cam.q = (camera.T_body_cam.q * rotation).normalized();
+  return {fmt::format("the rotation of T_BS (T_body_cam) is wrong: the image's right, its down and "
+                      "the optical axis point along the body's {}, and {} fits",
+                      given, AxesOf(camera.T_body_cam.q)),
+          camera};
 }
 
-CalibrationFault WrongImuAxes(const CameraModel& camera, const Quaterniond& rotation) {
-  return {.text = fmt::format("the IMU's samples are in other axes than T_BS (T_body_cam) says: "
-                              "rotate them so that x, y, z become the body's {}",
-                              AxesOf(rotation.conjugate())),
-          .T_body_cam = Rigid3(rotation, Eigen::Vector3d::Zero()) * camera.T_body_cam};
+CalibrationFault WrongImuAxes(CameraModel camera, const Quaterniond& rotation) {
+  camera.T_body_cam = Rigid3(rotation, Eigen::Vector3d::Zero()) * camera.T_body_cam;
+  return {
+      fmt::format("the IMU's samples are in other axes than T_BS (T_body_cam) says: rotate them "
+                  "so that x, y, z become the body's {}",
+                  AxesOf(rotation.conjugate())),
+      camera};
 }
 
 // The likelier one first, of those that cannot be told apart.
@@ -76,55 +80,71 @@ std::vector<CalibrationFault> FaultsOfRotations(const CameraModel& camera) {
   return faults;
 }
 
-// An angle's error is that of a pixel divided by the focal length, so this is in the given pixels.
-std::optional<double> CostWithout(std::span<const StartFrame> frames, const CalibrationFault& fault,
-                                  const ImuNoise& noise) {
-  const auto cost = GyroCost(WithoutFault(frames, fault), fault.T_body_cam, noise);
-  return cost ? std::optional(*cost * fault.focal_factor) : std::nullopt;
+// In pixels, so that cameras of other focal lengths can be compared. Infinite without tracks.
+double CostWithout(const FramesOf& frames_of, const CalibrationFault& fault,
+                   const ImuNoise& noise) {
+  const auto cost = GyroCost(WithoutFault(frames_of, fault), fault.camera.T_body_cam, noise);
+  return cost ? *cost / fault.camera.PixelAngle() : std::numeric_limits<double>::infinity();
+}
+
+// Around a factor of the grid, by steps that are halved.
+CalibrationFault BestFocalLength(const FramesOf& frames_of, const CameraModel& camera,
+                                 double factor, const ImuNoise& noise) {
+  const auto cost = [&](double tried) {
+    return CostWithout(frames_of, WrongFocalLength(camera, tried), noise);
+  };
+  double least = cost(factor);
+  for (double step = kFocalStep; step > kFocalAccuracy; step *= 0.5) {
+    for (const double tried : {factor * (1 - step), factor * (1 + step)}) {
+      if (const double found = cost(tried); found < least) {
+        least = found;
+        factor = tried;
+      }
+    }
+  }
+  return WrongFocalLength(camera, factor);
 }
 
 }  // namespace
 
-std::vector<StartFrame> WithoutFault(std::span<const StartFrame> frames,
-                                     const CalibrationFault& fault) {
-  std::vector<StartFrame> out(frames.begin(), frames.end());
-  for (StartFrame& frame : out) {
-    for (auto& [id, ray] : frame.rays) {
-      ray /= fault.focal_factor;
-    }
+bool AreSame(const CalibrationFault& a, const CalibrationFault& b) {
+  return a.gyro_sign == b.gyro_sign && a.accel_sign == b.accel_sign &&
+         a.camera.T_body_cam.q.angularDistance(b.camera.T_body_cam.q) < kSameAngle_rad &&
+         std::abs(std::log(a.camera.fx / b.camera.fx)) < kFocalStep;
+}
+
+std::vector<StartFrame> WithoutFault(const FramesOf& frames_of, const CalibrationFault& fault) {
+  std::vector<StartFrame> frames = frames_of(fault.camera);
+  for (StartFrame& frame : frames) {
     for (ImuSample& sample : frame.imu) {
       sample.gyro *= fault.gyro_sign;
       sample.accel *= fault.accel_sign;
     }
   }
-  return out;
+  return frames;
 }
 
-std::optional<CalibrationFault> FaultByRotations(std::span<const StartFrame> frames,
+std::optional<CalibrationFault> FaultByRotations(const FramesOf& frames_of,
                                                  const CameraModel& camera, const ImuNoise& noise) {
-  const auto given = CostWithout(frames, AsGiven(camera), noise);
-  if (!given) {
-    return std::nullopt;
-  }
+  double least = kFaultShare * CostWithout(frames_of, {.camera = camera}, noise);
   std::optional<CalibrationFault> best;
-  double least = kFaultShare * *given;
   for (CalibrationFault& fault : FaultsOfRotations(camera)) {
-    const auto cost = CostWithout(frames, fault, noise);
-    if (cost && *cost < least) {
-      least = *cost;
+    if (const double cost = CostWithout(frames_of, fault, noise); cost < least) {
+      least = cost;
       best = std::move(fault);
     }
   }
-  return best;
+  return best && best->camera.fx != camera.fx
+             ? BestFocalLength(frames_of, camera, best->camera.fx / camera.fx, noise)
+             : best;
 }
 
 CalibrationFault NegatedAccelerometer(const CameraModel& camera) {
-  CalibrationFault fault = AsGiven(camera);
-  fault.text =
-      "the accelerometer's sign is wrong: at rest it has to show +9.8 m/s^2 upwards, so "
-      "negate its three axes";
-  fault.accel_sign = -1;
-  return fault;
+  return {.text =
+              "the accelerometer's sign is wrong: at rest it has to show +9.8 m/s^2 upwards, so "
+              "negate its three axes",
+          .camera = camera,
+          .accel_sign = -1};
 }
 
 }  // namespace pangea::vio

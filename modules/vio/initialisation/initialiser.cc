@@ -87,16 +87,16 @@ double MeanMagnitude(const std::vector<ImuSample>& samples, Vector3d ImuSample::
 
 // The ray that the first row would have seen, for a distant point: with a shaking hand, the
 // rotation during the read-out is several pixels at the last row.
-Vector2d RayOfFirstRow(const Observation& seen, const CameraModel& camera,
+Vector2d RayOfFirstRow(const Vector2d& seen, double pixel_y, const CameraModel& camera,
                        const BodyMotion& motion) {
   if (camera.readout_s <= 0) {
-    return seen.ray;
+    return seen;
   }
-  const double row_s = camera.RowTime_s(static_cast<double>(seen.pixel.y()));
+  const double row_s = camera.RowTime_s(pixel_y);
   const Eigen::Quaterniond& q_body_cam = camera.T_body_cam.q;
   const Vector3d ray =
-      q_body_cam.conjugate() * (motion.After(row_s).q * (q_body_cam * seen.ray.homogeneous()));
-  return ray.z() > 0 ? Vector2d(ray.hnormalized()) : seen.ray;
+      q_body_cam.conjugate() * (motion.After(row_s).q * (q_body_cam * seen.homogeneous()));
+  return ray.z() > 0 ? Vector2d(ray.hnormalized()) : seen;
 }
 
 }  // namespace
@@ -176,7 +176,7 @@ bool Initialiser::InDoubt() const { return contradictions_ >= kDoubtful; }
 
 void Initialiser::NoteOutcome(const InitialResult& result) {
   contradictions_ = std::max(0, contradictions_ + (result.contradicts ? 1 : -1));
-  if (contradictions_ == kSearching || !possible_fault_.empty()) {
+  if (contradictions_ == kSearching || possible_fault_) {
     contradictions_ = kDoubtful;
     LookForFaults();
   }
@@ -184,20 +184,16 @@ void Initialiser::NoteOutcome(const InitialResult& result) {
 
 // Names a mistake if the odometry would start without it, at two attempts.
 void Initialiser::LookForFaults() {
-  const std::vector<StartFrame> frames = StartFrames(0);
-  std::vector<CalibrationFault> faults{NegatedAccelerometer(camera_)};
-  if (auto by_rotations = FaultByRotations(frames, camera_, noise_)) {
-    faults = {std::move(*by_rotations)};
-  }
-  const CalibrationFault& fault = faults.front();
-  std::string found;
-  if (TryMoving(WithoutFault(frames, fault), fault.T_body_cam).state) {
-    found = fault.text;
-  }
-  if (!found.empty() && found == possible_fault_) {
-    suspect_ = std::exchange(possible_fault_, "");
-  } else {
-    possible_fault_ = found;
+  const FramesOf frames_of = [this](const CameraModel& camera) { return StartFrames(camera, 0); };
+  const CalibrationFault fault =
+      FaultByRotations(frames_of, camera_, noise_).value_or(NegatedAccelerometer(camera_));
+  const auto before = std::exchange(possible_fault_, std::nullopt);
+  if (TryMoving(WithoutFault(frames_of, fault), fault.camera.T_body_cam).state) {
+    if (before && AreSame(*before, fault)) {
+      suspect_ = fault.text;
+    } else {
+      possible_fault_ = fault;
+    }
   }
 }
 
@@ -239,7 +235,8 @@ std::optional<InitialState> Initialiser::TryStationary() const {
   return state;
 }
 
-std::vector<StartFrame> Initialiser::StartFrames(double shift_s) const {
+// `camera`: camera_, or what it may be instead.
+std::vector<StartFrame> Initialiser::StartFrames(const CameraModel& camera, double shift_s) const {
   const int64_t shift = std::llround(1e6 * shift_s);
   ImuBuffer samples(noise_);
   samples.Add(samples_);
@@ -250,9 +247,14 @@ std::vector<StartFrame> Initialiser::StartFrames(double shift_s) const {
     if (!frames.empty()) {
       start.imu = SamplesBetween(samples_, frames.back().utime, start.utime);
     }
-    const BodyMotion motion = samples.MotionFrom(start.utime, camera_.readout_s, {}, ImuState{});
+    const BodyMotion motion = samples.MotionFrom(start.utime, camera.readout_s, {}, ImuState{});
     for (const Observation& observation : frame.observations) {
-      start.rays[observation.landmark_id] = RayOfFirstRow(observation, camera_, motion);
+      const auto ray = camera.fx == camera_.fx ? std::optional(observation.ray)
+                                               : camera.Unproject(observation.pixel.cast<double>());
+      if (ray) {
+        start.rays[observation.landmark_id] =
+            RayOfFirstRow(*ray, observation.pixel.y(), camera, motion);
+      }
     }
     frames.push_back(std::move(start));
   }
@@ -260,7 +262,7 @@ std::vector<StartFrame> Initialiser::StartFrames(double shift_s) const {
 }
 
 InitialResult Initialiser::TryMoving() {
-  const std::vector<StartFrame> frames = StartFrames(time_offset_change_s_);
+  const std::vector<StartFrame> frames = StartFrames(camera_, time_offset_change_s_);
   InitialResult result = TryMoving(frames, camera_.T_body_cam);
   if (result.state || !result.contradicts) {
     return result;
@@ -272,7 +274,7 @@ InitialResult Initialiser::TryMoving() {
   }
   time_offset_change_s_ += *offset;
   DropImagesBeforeSamples();
-  return TryMoving(StartFrames(time_offset_change_s_), camera_.T_body_cam);
+  return TryMoving(StartFrames(camera_, time_offset_change_s_), camera_.T_body_cam);
 }
 
 // Empty if the start is good.

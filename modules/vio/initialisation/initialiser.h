@@ -21,6 +21,7 @@
 #include "core/imu/imu.h"
 #include "vio/front_end/tracks.h"
 #include "vio/imu/stationary_options.h"
+#include "vio/initialisation/calibration_faults.h"
 #include "vio/initialisation/initial_solution.h"
 #include "vio/window/window_state.h"
 
@@ -73,7 +74,7 @@ class Initialiser {
   void NoteOutcome(const InitialResult& result);
   void LookForFaults();
   std::optional<InitialResult> Refusal(const std::optional<RefinedStart>& refined) const;
-  std::vector<StartFrame> StartFrames(double shift_s) const;
+  std::vector<StartFrame> StartFrames(const CameraModel& camera, double shift_s) const;
 
   CameraModel camera_;
   ImuNoise noise_;
@@ -86,8 +87,8 @@ class Initialiser {
   std::string why_not_ = "collecting images";  // result of the newest attempt
   int contradictions_ = 0;          // attempts at which images and IMU did not fit, less the others
   int64_t last_attempt_utime_ = 0;  // at a moving start
-  std::string possible_fault_;      // found once
-  std::string suspect_;             // found twice
+  std::optional<CalibrationFault> possible_fault_;  // found once
+  std::string suspect_;                             // found twice
 };
 
 }  // namespace pangea::vio
