@@ -107,6 +107,23 @@ class SpoilTest(unittest.TestCase):
         self.assertEqual(steps.painted["60.png"](bytes([100, 250])), bytes([40, 100]))
         self.assertEqual(steps.painted["120.png"](bytes([100, 250])), bytes([180, 255]))
 
+    def test_a_stationary_start(self):
+        recording = Recording(self.mav0)
+        recording.imu = [[row[0], "0.01", "0", "0", "0", "0", "9.0"] for row in recording.imu]
+        images, imu = list(recording.images), list(recording.imu)
+        recording.imu.insert(0, [str(int(imu[0][0]) - NS // 300), *imu[0][1:]])  # before the first image it moves already
+        SPOILERS["rest"](recording)
+        self.assertEqual((recording.images[200:], recording.imu[2000:]), (images, imu))
+        for rows, step in ((recording.images, NS // 20), (recording.imu, NS // 200)):
+            self.assertEqual({int(b[0]) - int(a[0]) for a, b in zip(rows, rows[1:])}, {step})
+        self.assertEqual({recording.origins[row[1]] for row in recording.images[:200]}, {images[0][1]})
+        a, b = (recording.painted[row[1]](bytes([100] * 500)) for row in recording.images[:2])
+        self.assertAlmostEqual(math.dist(a, b) / math.sqrt(500), 2 * math.sqrt(2), delta=0.4)
+        forces = [float(row[6]) for row in recording.imu[:2000]]
+        self.assertAlmostEqual(sum(forces) / 2000, 9.81, places=2)
+        self.assertAlmostEqual(math.dist(forces, 2000 * [9.81]) / math.sqrt(2000), 2e-3 * math.sqrt(200), delta=2e-3)
+        self.assertAlmostEqual(sum(float(row[1]) for row in recording.imu[:2000]) / 2000, 0.01, places=3)
+
     def test_people_walk_past_the_true_camera(self):
         # The camera looks along x, first from the origin, then from 1 m further on.
         yaml = "T_BS:\n  data: [0, 0, 1, 0, -1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 0, 1]\nresolution: [640, 480]\n" \

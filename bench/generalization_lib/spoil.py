@@ -6,7 +6,9 @@ import math
 import random
 import shutil
 import sys
+from operator import add
 from pathlib import Path
+from statistics import mean, median
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from ablation_lib.recording import direction, numbers, put, rotated  # noqa: E402
@@ -14,17 +16,22 @@ from generalization_lib import pictures  # noqa: E402
 from generalization_lib.people import crowd, people  # noqa: E402
 
 NS = 1_000_000_000
+GRAVITY = 9.81
 # A phone's IMU: white noise and random walks several times EuRoC's, at 100 Hz (densities of the order of the BMI160's).
 PHONE = {"gyroscope_noise_density": 5e-4, "gyroscope_random_walk": 5e-5, "accelerometer_noise_density": 1e-2,
          "accelerometer_random_walk": 3e-3}
 
 
 class Recording:
-    """Rows of the two tables as text, the two sensor.yaml, and the images to paint over: file -> a function of its pixels."""
+    """Rows of the two tables as text, the two sensor.yaml, and the images to paint over: file -> a function of its pixels.
+
+    An image that the source does not have is made of another one: `origins`, file -> the source's file.
+    """
 
     def __init__(self, mav0):
         self.mav0 = mav0
         self.painted = {}
+        self.origins = {}
         self.images = self._rows(mav0 / "cam0/data.csv")
         self.imu = self._rows(mav0 / "imu0/data.csv")
         self.camera_yaml = (mav0 / "cam0/sensor.yaml").read_text()
@@ -52,7 +59,7 @@ class Recording:
         folder.mkdir()
         for name in {row[1] for row in self.images}:
             if name in self.painted:
-                width, pixels = pictures.read(source / name)
+                width, pixels = pictures.read(source / self.origins.get(name, name))
                 pictures.write(folder / name, width, self.painted[name](pixels))
             else:
                 (folder / name).symlink_to((source / name).resolve())
@@ -288,6 +295,35 @@ def swapped_accel(recording):
         row[4], row[5] = row[5], row[4]
 
 
+def noisy(rng, sigma):
+    """A function that adds new noise to an image's pixels."""
+    largest = math.ceil(3 * sigma)
+    noise = bytes(largest + max(-largest, min(largest, round(rng.gauss(0, sigma)))) for _ in range(256))
+    clipped = bytes(max(0, min(255, grey - largest)) for grey in range(256 + 2 * largest))
+    return lambda pixels: bytes(map(clipped.__getitem__, map(add, pixels, rng.randbytes(len(pixels)).translate(noise))))
+
+
+def rest(recording, seconds=10, image_sigma=2):
+    """10 s before the first image in which the body is stationary: that image again and again with new noise, and an IMU with the
+    noise of its data sheet about the force of the first quarter of a second. It suits a recording that begins slowly."""
+    rng = random.Random("rest")
+    first, image_step = recording.images[0], int(recording.images[1][0]) - int(recording.images[0][0])
+    rate = numbers(recording.imu_yaml, "rate_hz")
+    recording.imu = [row for row in recording.imu if recording.stamp(row) >= 0]
+    columns = list(zip(*((float(value) for value in row[1:7]) for row in recording.imu)))
+    force = [mean(column[:round(rate / 4)]) for column in columns[3:]]
+    scale = GRAVITY / math.hypot(*force)
+    means = [median(column) for column in columns[:3]] + [scale * value for value in force]  # the median rate is about the bias
+    sigmas = [numbers(recording.imu_yaml, f"{sensor}_noise_density") * math.sqrt(rate)
+              for sensor in ("gyroscope", "accelerometer") for _ in range(3)]
+    samples = [[str(int(recording.imu[0][0]) - round(i * NS / rate)), *(f"{rng.gauss(m, s):.10f}" for m, s in zip(means, sigmas))]
+               for i in range(round(seconds * rate), 0, -1)]
+    images = [[str(int(first[0]) - i * image_step), f"rest_{i}.png"] for i in range(seconds * NS // image_step, 0, -1)]
+    for _, name in images:
+        recording.painted[name], recording.origins[name] = noisy(rng, image_sigma), first[1]
+    recording.imu, recording.images = samples + recording.imu, images + recording.images
+
+
 def product(a, b):
     """The product of two 4x4 matrices, row by row."""
     return [sum(a[4 * i + k] * b[4 * k + j] for k in range(4)) for i in range(4) for j in range(4)]
@@ -332,7 +368,7 @@ SPOILERS = {f.__name__: f for f in (half_rate, image_gaps, lone_images, imu_gaps
                                     accel_scale, lost_imu, doubled_imu, browser_motion, browser_stamps, covered, hand, pocket,
                                     exposure_steps, people, crowd,
                                     copies_at_60_hz, repeated_images, shown_too_early, negated_accel, negated_gyro,
-                                    gyro_in_degrees, swapped_accel, inverse_extrinsics, turned_camera, backward_camera,
+                                    gyro_in_degrees, swapped_accel, rest, inverse_extrinsics, turned_camera, backward_camera,
                                     long_focal_length, short_focal_length)}
 
 

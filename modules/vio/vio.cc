@@ -186,6 +186,7 @@ VioOutput Vio::Estimate(const TrackedFrame& frame, const cv::Mat& image,
   output.v_odom_body = result.v_odom_body;
   output.motion = result.motion;
   output.is_keyframe = result.is_keyframe;
+  output.stationary = result.stationary;
   output.imu_contradicted = result.imu_contradicted;
   output.num_tracked = static_cast<int>(frame.observations.size());
   for (const FinishedKeyframe& finished : result.finished) {

@@ -55,6 +55,7 @@ struct VioOutput {
   int num_tracked = 0;
   // Relative sigma of the scale, from the newest keyframe with enough depths to estimate it.
   std::optional<double> scale_sigma;
+  bool stationary = false;          // the body is, and its pose is held
   bool imu_contradicted = false;    // it measures an acceleration that the images do not show
   bool is_keyframe = false;         // corners are described; the keyframe is finished later
   std::vector<Keyframe> keyframes;  // those that this image finished

@@ -22,6 +22,7 @@ namespace {
 constexpr int64_t kLagToldInterval_us = 10'000'000;
 constexpr int64_t kNotableLag_us = 500'000;
 
+constexpr char kTracking[] = "tracking";
 constexpr char kSaturated[] =
     "the IMU is at the end of its range, and does not see the whole motion";
 constexpr char kContradicted[] =
@@ -127,7 +128,7 @@ void VioProcess::Handle(const VioOutput& output) {
   node_.Count("frames");
   node_.Set("maps", vio_->maps_opened());
   node_.Set("tracked", output.num_tracked);
-  if (tracking && state_text_ != "tracking") {
+  if (tracking && !state_text_.starts_with(kTracking)) {
     node_.Set("initialised_ms", (output.utime - *first_image_utime_) / 1000);
   }
   doubt_ = !tracking                 ? ""
@@ -142,7 +143,7 @@ void VioProcess::Handle(const VioOutput& output) {
   }
   state_text_ =
       tracking
-          ? "tracking"
+          ? std::string(kTracking) + (output.stationary ? ", stationary" : "")
           : fmt::format("{}: {}", output.state == EstimatorState::kLost ? "lost" : "initialising",
                         WithSuspect(output));
   if (output.state == EstimatorState::kLost) {

@@ -313,6 +313,31 @@ TEST_F(VioProcessTest, SaysThatTheImuIsAtTheEndOfItsRange) {
                                               found)));
 }
 
+TEST_F(VioProcessTest, SaysThatItIsStationaryUntilItMoves) {
+  VioProcess process(bus_, options_, 0);
+  process.Open(world_.camera(), ImuNoise{});
+  const cv::Mat image = RandomTexture(752, 480, 11);
+  const auto play = [&](int64_t from, int64_t to, double speed) {
+    for (int64_t utime = from; utime < to; utime += kImageStep_us) {
+      std::vector<ImuSample> imu;
+      for (; next_imu_ <= utime; next_imu_ += kImuStep_us) {
+        const Eigen::Vector3d up(0, 0, kGravity);
+        imu.push_back({next_imu_, Eigen::Vector3d::Zero(), World::Pose(0).q.conjugate() * up});
+      }
+      const auto seen = static_cast<int64_t>(speed * static_cast<double>(utime - from));
+      TrackedFrame frame = world_.Frame(seen);
+      frame.utime = utime;
+      process.AddTracks(frame, image, imu);
+    }
+    process.Tick(to);
+    bus_.Drain();
+  };
+  play(0, 3'000'000, 0);
+  EXPECT_THAT(status_.summary, ::testing::HasSubstr("tracking, stationary"));
+  play(3'000'000, 4'100'000, 1);
+  EXPECT_THAT(status_.summary, ::testing::Not(::testing::HasSubstr("stationary")));
+}
+
 TEST_F(VioProcessTest, AGyroscopeInDegreesIsNamed) {
   VioProcess process(bus_, options_, 0);
   process.Open(world_.camera(), ImuNoise{});

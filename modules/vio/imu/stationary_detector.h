@@ -1,7 +1,9 @@
 #pragma once
 
 // Detects whether the body is stationary: the image has moved by no more than its noise, since the
-// body stopped or during the last half second, and the IMU is quiet.
+// body stopped or during the last half second, and the IMU is quiet. A stationary body may be
+// shaken, as by motors or steps on the floor: it stays stationary while hardly a track moves and
+// the IMU's means stay.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -22,19 +24,22 @@ class StationaryDetector {
   StationaryDetector(const CameraModel& camera, double ray_sigma, const StationaryOptions& options)
       : camera_(camera), ray_sigma_(ray_sigma), options_(options) {}
 
-  // Call in time order. Returns whether the body is stationary at this frame. `shift_sigmas`: how
-  // far the image has moved since the body stopped, if it has (TrackHistory::MedianShiftSigmas).
-  bool AddFrame(const TrackedFrame& frame, std::optional<double> shift_sigmas, const ImuBuffer& imu,
+  // Call in time order. Returns whether the body is stationary at this frame. `since_stop`: how far
+  // the image has moved since the body stopped, if it has.
+  bool AddFrame(const TrackedFrame& frame,
+                const std::optional<TrackHistory::ShiftSigmas>& since_stop, const ImuBuffer& imu,
                 const Eigen::Vector3d& gyro_bias);
 
  private:
-  bool IsQuiet(const ImuBuffer& imu, const Eigen::Vector3d& gyro_bias) const;
+  bool HasStoodForAWhile(const TrackedFrame& frame) const;
 
   CameraModel camera_;
   double ray_sigma_;
   StationaryOptions options_;
   TrackHistory recent_;
   std::deque<int64_t> recent_utimes_;
+  // Mean specific force of the last quiet samples, or of the first ones since the body stopped.
+  std::optional<Eigen::Vector3d> rest_accel_;
 };
 
 }  // namespace pangea::vio

@@ -28,6 +28,9 @@ struct Ride {
   Vector3d seen_omega = Vector3d::Zero();  // added to the gyro's reading
   Vector3d gyro_bias = Vector3d::Zero();   // gyro bias that the estimator assumes
   double accel_sigma = 0.03;               // m/s^2, each axis
+  // After the first half second, m/s^2: noise in place of accel_sigma, and an acceleration upwards.
+  std::optional<double> late_accel_sigma = {};
+  double late_accel = 0;
   StationaryOptions options = {};
 };
 
@@ -39,8 +42,12 @@ struct Said {
 ImuSample SampleAt(const Ride& ride, int i, std::mt19937_64& rng) {
   const double t = i / kRate_hz;
   const Vector3d gravity = ExpSo3(t * ride.omega).conjugate() * Vector3d(0, 0, kGravity);
+  const bool late = t > kSilent / kFrameRate_hz;
+  const double accel_sigma =
+      late ? ride.late_accel_sigma.value_or(ride.accel_sigma) : ride.accel_sigma;
+  const Vector3d up(0, 0, late ? ride.late_accel : 0);
   return {std::llround(1e6 * t), ride.omega + ride.seen_omega + RandomVector(rng, 2e-3),
-          gravity + RandomVector(rng, ride.accel_sigma)};
+          gravity + up + RandomVector(rng, accel_sigma)};
 }
 
 TrackedFrame FrameAt(const Ride& ride, const CameraModel& camera, double t,
@@ -58,8 +65,9 @@ TrackedFrame FrameAt(const Ride& ride, const CameraModel& camera, double t,
   return frame;
 }
 
-// `shift_sigmas`: if given, every frame has this shift.
-Said Watch(const Ride& ride, std::optional<double> shift_sigmas = std::nullopt) {
+// `since_stop`: if given, every frame has this shift.
+Said Watch(const Ride& ride,
+           const std::optional<TrackHistory::ShiftSigmas>& since_stop = std::nullopt) {
   std::mt19937_64 rng(1);
   std::uniform_real_distribution<double> uniform(-1, 1);
   const CameraModel camera = PinholeTestCamera(640, 480, 400);
@@ -78,13 +86,14 @@ Said Watch(const Ride& ride, std::optional<double> shift_sigmas = std::nullopt) 
       imu.Add({&sample, 1});
     }
     const bool stationary =
-        detector.AddFrame(FrameAt(ride, camera, t, points, rng), shift_sigmas, imu, ride.gyro_bias);
+        detector.AddFrame(FrameAt(ride, camera, t, points, rng), since_stop, imu, ride.gyro_bias);
     (i < kSilent ? said.early : said.stationary) += stationary ? 1 : 0;
   }
   return said;
 }
 
 constexpr int kAll = kFrames - kSilent;
+constexpr TrackHistory::ShiftSigmas kNoise{1.7, 2.5};
 
 TEST(StationaryDetector, FindsItStationaryWhateverThePixelsNoise) {
   for (const double pixel_noise : {0.1, 0.7, 3.0}) {
@@ -115,10 +124,23 @@ TEST(StationaryDetector, ASlowMotionIsNotStationary) {
 TEST(StationaryDetector, WhatHasMovedSinceItStoodStillIsNotStationary) {
   const Ride creeping{.v = {0, 0.004, 0}};
   EXPECT_EQ(Watch(creeping).stationary, kAll);
-  EXPECT_EQ(Watch(creeping, 3.0).stationary, 0);
-  const Said standing = Watch({}, 1.7);
+  EXPECT_EQ(Watch(creeping, {{3.0, 4.0}}).stationary, 0);
+  const Said standing = Watch({}, kNoise);
   EXPECT_EQ(standing.stationary, kAll);
   EXPECT_EQ(standing.early, kSilent) << "being stationary still is told at once";
+}
+
+// The IMU alone is no evidence of motion.
+TEST(StationaryDetector, AShakenBodyStaysStationaryWhileHardlyATrackMoves) {
+  const Ride shaken{.late_accel_sigma = 0.4};
+  EXPECT_EQ(Watch(shaken, kNoise).stationary, kAll);
+  constexpr int kUntilShaken = 5;  // frames
+  EXPECT_LT(Watch(shaken, {{2.0, 3.5}}).stationary, kUntilShaken) << "a fifth of the tracks moves";
+  EXPECT_EQ(Watch(shaken, {{2.3, 3.0}}).stationary, 0) << "half of the tracks move a little";
+  const Ride rotating{.seen_omega = {0, 0.08, 0}, .late_accel_sigma = 0.4};
+  EXPECT_EQ(Watch(rotating, kNoise).stationary, 0);
+  const Ride sets_off{.late_accel_sigma = 0.4, .late_accel = 0.7};
+  EXPECT_LT(Watch(sets_off, kNoise).stationary, kUntilShaken);
 }
 
 // In a lift the images are stationary, but the IMU is not.

@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "core/imu/preintegration.h"
-#include "core/median.h"
 #include "vio/imu/imu_buffer.h"
 #include "vio/imu/imu_noise.h"
 #include "vio/initialisation/calibration_faults.h"
@@ -33,15 +32,15 @@ constexpr double kMaxMeanAccel = 25;  // m/s^2
 // About one rotation per second, at which no image is sharp; a sensor in degrees/s shows more.
 constexpr double kMaxMeanGyro = 6;  // rad/s
 
-// Stationary: the image does not move, accelerometer and gyro are quiet.
+// Stationary: the image does not move, accelerometer and gyro are quiet. Or they are shaken about
+// means that stay, and in no image of the span do most tracks move.
 constexpr double kStationarySpan_s = 1.0;
-constexpr double kStationarySigmas =
-    2.2;  // median shift in sigmas of a pixel: noise alone gives 1.7
 // Limits as shares of the options: a whole second is tested, so they are tighter than later.
 constexpr double kStationaryAccel = 5.0 / 6;  // standard deviation, of accel_sigma
 constexpr double kStationaryGyro = 0.6;       // standard deviation, of gyro_rate
 // A stationary start assumes a smaller bias than a moving one; a larger one would tilt it.
 constexpr double kStationaryBias = 0.1 / 0.15;  // of accel_bias_sigma
+constexpr double kMinGyroBiasSigma = 0.002;     // rad/s; a shaken mean is known less well
 
 // Requirements on the result of a moving start.
 constexpr double kMaxVelocitySigma = 0.05;  // m/s, or
@@ -57,7 +56,8 @@ constexpr int kDoubtful = 5;
 constexpr int kSearching = 8;
 constexpr double kDoubtfulInterval_s = 0.8;
 
-double MedianDisplacement(const TrackedFrame& a, const TrackedFrame& b, size_t* shared) {
+// Of the tracks that both frames have, in ascending order.
+std::vector<double> Displacements(const TrackedFrame& a, const TrackedFrame& b) {
   std::vector<double> displacement;
   for (const Observation& first : a.observations) {
     for (const Observation& second : b.observations) {
@@ -66,11 +66,19 @@ double MedianDisplacement(const TrackedFrame& a, const TrackedFrame& b, size_t* 
       }
     }
   }
-  *shared = displacement.size();
-  if (displacement.empty()) {
-    return 1e9;
-  }
-  return Median(std::move(displacement));
+  std::sort(displacement.begin(), displacement.end());
+  return displacement;
+}
+
+bool DisplacedLessThan(double limit, double share, const std::vector<double>& displacements) {
+  const auto at = static_cast<size_t>(share * static_cast<double>(displacements.size()));
+  return displacements.size() >= kMinTracks && displacements[at] <= limit;
+}
+
+bool MeanForceStays(std::span<const ImuSample> samples) {
+  const size_t half = samples.size() / 2;
+  return (MomentsOf(samples.first(half)).accel_mean - MomentsOf(samples.subspan(half)).accel_mean)
+             .norm() < kMaxStationaryAccelChange;
 }
 
 double SpanSeconds(int64_t from_utime, int64_t to_utime) {
@@ -97,6 +105,28 @@ Vector2d RayOfFirstRow(const Vector2d& seen, double pixel_y, const CameraModel& 
   const Vector3d ray =
       q_body_cam.conjugate() * (motion.After(row_s).q * (q_body_cam * seen.homogeneous()));
   return ray.z() > 0 ? Vector2d(ray.hnormalized()) : seen;
+}
+
+InitialState StationaryState(const TrackedFrame& frame, const SampleMoments& moments,
+                             size_t num_samples, double bias_sigma) {
+  InitialState state;
+  state.stationary = true;
+  ImuState imu;
+  imu.T_odom_body.q = Eigen::Quaterniond::FromTwoVectors(moments.accel_mean, Vector3d::UnitZ());
+  imu.gyro_bias = moments.gyro_mean;
+  state.frames.push_back({frame, imu, 0});
+  // For a stationary body, an accelerometer bias cannot be distinguished from a tilt: so the bias
+  // determines the uncertainty of the tilt.
+  Eigen::Matrix<double, 15, 1> sigma;
+  const auto count = static_cast<double>(num_samples);
+  const double tilt_sigma =
+      std::sqrt(bias_sigma * bias_sigma + moments.accel_variance / count) / kGravity;
+  const double gyro_bias_sigma =
+      std::max(kMinGyroBiasSigma, std::sqrt(moments.gyro_variance / count));
+  sigma << Vector3d(tilt_sigma, tilt_sigma, 1e-4), Vector3d::Constant(1e-4),
+      Vector3d::Constant(0.01), Vector3d::Constant(gyro_bias_sigma), Vector3d::Constant(bias_sigma);
+  state.covariance = sigma.cwiseAbs2().asDiagonal();
+  return state;
 }
 
 }  // namespace
@@ -207,32 +237,24 @@ std::optional<InitialState> Initialiser::TryStationary() const {
     return std::nullopt;
   }
   const std::vector<ImuSample> samples = SamplesBetween(samples_, oldest->utime, now);
-  size_t shared = 0;
-  const double moved = MedianDisplacement(*oldest, frames_.back(), &shared);
-  if (samples.size() < 20 || shared < kMinTracks || moved > kStationarySigmas * pixel_sigma_) {
+  if (samples.size() < 20 || !DisplacedLessThan(kStationarySigmas * pixel_sigma_, 0.5,
+                                                Displacements(*oldest, frames_.back()))) {
     return std::nullopt;
   }
   const SampleMoments moments = MomentsOf(samples);
   const double max_accel = kStationaryAccel * stationary_.accel_sigma;
   const double max_gyro = kStationaryGyro * kMaxStationaryRate;
-  if (moments.accel_variance > max_accel * max_accel ||
-      moments.gyro_variance > max_gyro * max_gyro) {
+  const bool quiet = moments.accel_variance <= max_accel * max_accel &&
+                     moments.gyro_variance <= max_gyro * max_gyro;
+  const auto shows_no_motion = [&](const TrackedFrame& frame) {
+    return DisplacedLessThan(kStationaryMostSigmas * pixel_sigma_, kMostTracks,
+                             Displacements(*oldest, frame));
+  };
+  if (!quiet && !(MeanForceStays(samples) && std::all_of(oldest, frames_.end(), shows_no_motion))) {
     return std::nullopt;
   }
-  InitialState state;
-  state.stationary = true;
-  ImuState imu;
-  imu.T_odom_body.q = Eigen::Quaterniond::FromTwoVectors(moments.accel_mean, Vector3d::UnitZ());
-  imu.gyro_bias = moments.gyro_mean;
-  state.frames.push_back({frames_.back(), imu, 0});
-  // For a stationary body, an accelerometer bias cannot be distinguished from a tilt: so the bias
-  // determines the uncertainty of the tilt.
-  Eigen::Matrix<double, 15, 1> sigma;
-  const double bias_sigma = kStationaryBias * sigmas_.accel_bias;
-  sigma << Vector3d(bias_sigma / kGravity, bias_sigma / kGravity, 1e-4), Vector3d::Constant(1e-4),
-      Vector3d::Constant(0.01), Vector3d::Constant(0.002), Vector3d::Constant(bias_sigma);
-  state.covariance = sigma.cwiseAbs2().asDiagonal();
-  return state;
+  return StationaryState(frames_.back(), moments, samples.size(),
+                         kStationaryBias * sigmas_.accel_bias);
 }
 
 // `camera`: camera_, or what it may be instead.

@@ -4,9 +4,9 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <limits>
-#include <utility>
 
 #include "core/median.h"
+#include "vio/imu/stationary_options.h"
 
 namespace pangea::vio {
 namespace {
@@ -15,7 +15,7 @@ namespace {
 // continue in it. In the noise of a covered lens a tenth do.
 constexpr size_t kMinTracks = 4;
 constexpr double kMinTrackShare = 0.3;
-constexpr size_t kMinShared = 15;  // landmarks needed for a median shift
+constexpr size_t kMinShared = 15;  // landmarks needed for a shift in sigmas
 
 // d(ray)/d(intrinsics): a change of the intrinsics acts like a change of the pixel by (pixel - c) e
 // + f d + (change of the distortion), with the opposite sign.
@@ -152,15 +152,19 @@ TrackHistory::Shift TrackHistory::ShiftBetween(int64_t from_utime, int64_t to_ut
   return {Median(shifts), shifts.size()};
 }
 
-double TrackHistory::MedianShiftSigmas(int64_t from_utime, int64_t to_utime) const {
+TrackHistory::ShiftSigmas TrackHistory::ShiftSigmasBetween(int64_t from_utime,
+                                                           int64_t to_utime) const {
   std::vector<double> shifts;
   ForShared(Frame(from_utime), Frame(to_utime), [&](const FrameRay& from, const FrameRay& to) {
     shifts.push_back((from.ray - to.ray).norm() / from.sigma);
   });
   if (shifts.size() < kMinShared) {
-    return std::numeric_limits<double>::infinity();
+    constexpr double kUnknown = std::numeric_limits<double>::infinity();
+    return {kUnknown, kUnknown};
   }
-  return Median(std::move(shifts));
+  std::sort(shifts.begin(), shifts.end());
+  const auto most = static_cast<size_t>(kMostTracks * static_cast<double>(shifts.size()));
+  return {shifts[shifts.size() / 2], shifts[most]};
 }
 
 }  // namespace pangea::vio

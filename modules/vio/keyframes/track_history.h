@@ -48,9 +48,13 @@ class TrackHistory {
   Shift ShiftBetween(int64_t from_utime, int64_t to_utime,
                      const Eigen::Quaterniond& q_to_from) const;
 
-  // Median shift of the landmarks that two frames share, rotation not taken out, in sigmas of a
-  // ray: 1.7 if nothing moves. Infinite if they share too few.
-  double MedianShiftSigmas(int64_t from_utime, int64_t to_utime) const;
+  // Shift of the landmarks that two frames share, rotation not taken out, in sigmas of a ray.
+  // Infinite if they share too few.
+  struct ShiftSigmas {
+    double median = 0;  // 1.7 if nothing moves
+    double most = 0;    // 80 % quantile: 2.5 if nothing moves
+  };
+  ShiftSigmas ShiftSigmasBetween(int64_t from_utime, int64_t to_utime) const;
 
  private:
   std::map<int64_t, SeenLandmarks> frames_;

@@ -37,6 +37,8 @@ constexpr int64_t kStartSpan_us = 4'000'000;  // span of samples that a start ma
 constexpr int64_t kSettling_us = 2'000'000;
 constexpr double kSettlingWalk = 10;
 
+constexpr double kMaxStationaryGap_s = 0.5;  // from the last stationary window keyframe to motion
+
 constexpr int kMaxIterations = 4;
 // A start has no earlier solution: with little information four iterations end half way.
 constexpr int kStartIterations = 20;
@@ -143,6 +145,7 @@ void Estimator::Impl::Start(const InitialState& initial) {
     }
     Newest().is_window_keyframe = true;
   }
+  Newest().stationary = initial.stationary;
   problem.state.time_offset_s += initial.time_offset_error_s;
   started = true;
   settled_imu_utime = Newest().imu_utime + kSettling_us;
@@ -189,16 +192,24 @@ void Estimator::Impl::DropNonKeyframe() {
 
 void Estimator::Impl::AddToWindow(const TrackedFrame& frame) {
   history.AddFrame(frame, camera, ray_sigma);
-  const std::optional<double> shift =
+  const auto since_stop =
       LastWindowKeyframe().stationary
-          ? std::optional(history.MedianShiftSigmas(LastWindowKeyframe().utime, frame.utime))
+          ? std::optional(history.ShiftSigmasBetween(LastWindowKeyframe().utime, frame.utime))
           : std::nullopt;
   const bool stationary =
-      stationary_detector.AddFrame(frame, shift, imu_samples, Newest().imu.gyro_bias);
+      stationary_detector.AddFrame(frame, since_stop, imu_samples, Newest().imu.gyro_bias);
   const bool is_tracked = history.Continues(Newest().utime, frame.utime);
+  // The last stationary frame keeps its place when motion begins. Samples integrated from an
+  // earlier one, seconds ago, would let the pose step.
+  Newest().is_window_keyframe |=
+      Newest().stationary && !stationary &&
+      Seconds(Newest().utime - LastWindowKeyframe().utime) > kMaxStationaryGap_s;
   DropNonKeyframe();
   const ImuFactor factor = MakeImuFactor(Newest(), ImuTime(frame.utime));
-  Append(frame.utime, Predict(factor.span.measured, Newest().imu), factor);
+  // A stationary frame begins where the last one stood: what seconds of shaken samples predict may
+  // be too far off for a few iterations.
+  const bool is_held = stationary && Newest().stationary;
+  Append(frame.utime, is_held ? Newest().imu : Predict(factor.span.measured, Newest().imu), factor);
   Newest().stationary = stationary;
   Newest().is_tracked = is_tracked;
 }
@@ -338,6 +349,7 @@ void Estimator::Impl::TellNewest(FrameResult* result) {
   result->gyro_bias = Newest().imu.gyro_bias;
   result->accel_bias = Newest().imu.accel_bias;
   result->is_keyframe = Newest().is_keyframe;
+  result->stationary = Newest().stationary;
   const auto& factor = problem.imu_factors.back();
   result->imu_contradicted = factor && factor->contradicted;
 }

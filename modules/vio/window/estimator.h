@@ -103,6 +103,7 @@ struct FrameResult {
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();
   Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();
   bool is_keyframe = false;       // this frame will be finished as a keyframe later
+  bool stationary = false;        // the body is, and its pose is held
   bool imu_contradicted = false;  // the IMU measures an acceleration that the images do not show
   std::vector<FinishedKeyframe> finished;
   std::vector<int32_t> outlier_landmarks;  // the tracker should drop these
