@@ -28,12 +28,14 @@ std::string WithoutNumbers(std::string text) {
 void PoseCount::Add(int64_t utime) {
   first_utime_ = first_utime_.value_or(utime);
   ++images_;
+  images_since_suspect_ += suspect_.empty() ? 0 : 1;
   late_images_ += utime - *first_utime_ > kStart_us ? 1 : 0;
 }
 
 void PoseCount::AddPose(int64_t utime) {
   Add(utime);
   ++poses_;
+  poses_since_suspect_ += suspect_.empty() ? 0 : 1;
 }
 
 void PoseCount::AddNone(int64_t utime, const std::string& reason, const std::string& suspect) {
@@ -60,9 +62,14 @@ std::string PoseCount::Reasons() const {
   return text;
 }
 
+bool PoseCount::AreFew() const {
+  return 2 * poses_ < late_images_ || poses_ == 0 ||
+         2 * poses_since_suspect_ < images_since_suspect_;
+}
+
 std::optional<std::string> PoseCount::WhyFew() const {
   const std::string probably = suspect_.empty() ? "" : "Probably " + suspect_;
-  if (images_ == 0 || (poses_ > 0 && 2 * poses_ >= late_images_)) {
+  if (images_ == 0 || !AreFew()) {
     return std::nullopt;
   }
   if (poses_ == 0) {

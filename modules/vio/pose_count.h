@@ -28,6 +28,7 @@ class PoseCount {
     std::string newest;  // with its numbers
   };
   void Add(int64_t utime);
+  bool AreFew() const;
   std::string Reasons() const;
 
   std::optional<int64_t> first_utime_;
@@ -37,6 +38,8 @@ class PoseCount {
   std::map<std::string, Reason> reasons_;  // by their text without numbers
   std::string last_reason_;
   std::string suspect_;
+  int64_t images_since_suspect_ = 0;
+  int64_t poses_since_suspect_ = 0;
 };
 
 }  // namespace pangea::vio

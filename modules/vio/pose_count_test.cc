@@ -68,5 +68,14 @@ TEST_F(PoseCountTest, TheSuspectIsNamed) {
   EXPECT_THAT(*count_.WhyFew(), HasSubstr("have one. Probably the sign is wrong. Why"));
 }
 
+// A false start may last long.
+TEST_F(PoseCountTest, ASuspectCountsUntilMostImagesHaveAPoseAgain) {
+  AddPoses(500);
+  AddNone(50, "no fit", "the sign is wrong");
+  EXPECT_THAT(*count_.WhyFew(), HasSubstr("few poses: 500 of 550 images have one. Probably the"));
+  AddPoses(50);
+  EXPECT_FALSE(count_.WhyFew());
+}
+
 }  // namespace
 }  // namespace pangea::vio

@@ -366,7 +366,7 @@ TEST_F(VioProcessTest, AWrongSignIsNamedWithTheMend) {
     process.AddTracks(world_.Frame(utime), image, imu);
   }
   const char mend[] =
-      "robably the accelerometer's sign is wrong: at rest it has to show +9.8 m/s^2 upwards, so "
+      "robably the accelerometer's sign is wrong: a stationary one shows +9.8 m/s^2 upwards; "
       "negate its three axes";
   EXPECT_THAT(*process.WhyFewPoses(), ::testing::HasSubstr(mend));
   bus_.Drain();

@@ -141,7 +141,7 @@ std::optional<CalibrationFault> FaultByRotations(const FramesOf& frames_of,
 
 CalibrationFault NegatedAccelerometer(const CameraModel& camera) {
   return {.text =
-              "the accelerometer's sign is wrong: at rest it has to show +9.8 m/s^2 upwards, so "
+              "the accelerometer's sign is wrong: a stationary one shows +9.8 m/s^2 upwards; "
               "negate its three axes",
           .camera = camera,
           .accel_sign = -1};
