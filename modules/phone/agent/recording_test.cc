@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <optional>
 #include <vector>
 
+#include "bus/node.h"
 #include "phone/agent/phone_agent.h"
 #include "recording/euroc.h"
 #include "vio/playback.h"
@@ -33,8 +35,14 @@ Messages PlayedByVio(const EurocRecording& recording) {
   return keyframes;
 }
 
-TEST(PhoneAgentRecordingTest, GivesTheSameKeyframesAsPangeaVio) {
-  const EurocRecording recording(std::string(PANGEA_BINARY_DIR) + "/tests/walk_1");
+struct Played {
+  Messages keyframes;
+  int tracked = 0;                  // images with a pose
+  std::optional<int64_t> repeated;  // images that the agent took for copies
+};
+
+// `copies`: of each image, 10 ms apart, as a browser shows those of a slow camera.
+Played PlayedByAgent(const EurocRecording& recording, int copies) {
   AgentConfig config;
   config.agent_id = 7;
   config.opened_utime = kOpened_utime;
@@ -42,30 +50,53 @@ TEST(PhoneAgentRecordingTest, GivesTheSameKeyframesAsPangeaVio) {
   config.sigmas = recording.calibration_sigmas();
   config.imu_noise = recording.imu_noise();
   PhoneAgent agent(config);
-  Messages keyframes;
-  int tracked = 0;
+  Played played;
   const auto take = [&] {
     const PhoneEvents events = agent.Take();
-    keyframes.insert(keyframes.end(), events.keyframes.begin(), events.keyframes.end());
-    tracked += events.pose && events.pose->state == pose_t::STATE_TRACKING ? 1 : 0;
+    played.keyframes.insert(played.keyframes.end(), events.keyframes.begin(),
+                            events.keyframes.end());
+    played.tracked += events.pose && events.pose->state == pose_t::STATE_TRACKING ? 1 : 0;
+    if (events.vio_status) {
+      played.repeated = CounterOf(*events.vio_status, "images_repeated");
+    }
   };
   size_t next_imu = 0;
   for (size_t i = 0; i < recording.images().size(); ++i) {
-    const int64_t utime = recording.images()[i].utime;
     std::string why;
-    agent.AddImage(utime, recording.LoadImage(i, &why));
-    for (; next_imu < recording.imu().size() && recording.imu()[next_imu].utime <= utime + 60'000;
-         ++next_imu) {
-      agent.AddImu(recording.imu()[next_imu]);
+    const cv::Mat image = recording.LoadImage(i, &why);
+    for (int copy = 0; copy < copies; ++copy) {
+      const int64_t utime = recording.images()[i].utime + 10'000 * copy;
+      agent.AddImage(utime, image);
+      for (; next_imu < recording.imu().size() && recording.imu()[next_imu].utime <= utime + 60'000;
+           ++next_imu) {
+        agent.AddImu(recording.imu()[next_imu]);
+      }
+      agent.Poll(kOpened_utime + utime);
+      take();
     }
-    agent.Poll(kOpened_utime + utime);
-    take();
   }
   agent.Flush();
   take();
-  EXPECT_GT(tracked, 100);
-  ASSERT_GT(keyframes.size(), 10u);
-  EXPECT_EQ(keyframes, PlayedByVio(recording));
+  return played;
+}
+
+TEST(PhoneAgentRecordingTest, GivesTheSameKeyframesAsPangeaVio) {
+  const EurocRecording recording(std::string(PANGEA_BINARY_DIR) + "/tests/walk_1");
+  const Played played = PlayedByAgent(recording, 1);
+  EXPECT_GT(played.tracked, 100);
+  EXPECT_FALSE(played.repeated);
+  ASSERT_GT(played.keyframes.size(), 10u);
+  EXPECT_EQ(played.keyframes, PlayedByVio(recording));
+}
+
+TEST(PhoneAgentRecordingTest, CopiesOfAnImageAreCountedAndHaveNoPose) {
+  const EurocRecording recording(std::string(PANGEA_BINARY_DIR) + "/tests/walk_1");
+  const Played once = PlayedByAgent(recording, 1);
+  const Played twice = PlayedByAgent(recording, 2);
+  EXPECT_EQ(twice.tracked, once.tracked);
+  EXPECT_EQ(twice.keyframes.size(), once.keyframes.size());
+  EXPECT_GT(twice.repeated.value_or(0), once.tracked - 25)
+      << "the status is published once a second";
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#!/ usr / bin / env python3
+#!/usr/bin/env python3
 """The agent as WebAssembly, in Node, against pangea-vio on a rendered recording of a phone.
 
 wasm_test.py PROGRAMS WASM WORK
