@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <tuple>
+#include <utility>
 
 #include "posegraph/solver/four_dof_record.h"
 
@@ -28,6 +29,9 @@ constexpr double kViewpointAngle_rad = 0.15;
 // Largest share, of the agreeing viewpoints, that the best rival set may have.
 constexpr double kMaxRivalShare = 0.5;
 constexpr double kMaxRivalShareAtOneSpot = 0.25;
+// A constraint's covariance is up to this many times too small on real images (NEES, bench/README),
+// so a candidate that fits with one so much larger is no rival.
+constexpr double kMaxNees = 10;
 // Minimum drift while maps are compared, as standard deviations per metre of path. It has no effect
 // on the weights of the solve.
 constexpr double kMinDrift_per_m = 0.02;
@@ -89,19 +93,22 @@ PairEvidence::Innovation PairEvidence::Compare(const Candidate& k, const Candida
   return innovation;
 }
 
-bool PairEvidence::Predicts(const Candidate& l, const Candidate& k) const {
+PairEvidence::Agreement PairEvidence::Predicts(const Candidate& l, const Candidate& k) const {
   const Innovation innovation = Compare(k, l);
-  const Matrix4d covariance = innovation.measurement + innovation.odometry;
-  return innovation.error.dot(covariance.ldlt().solve(innovation.error)) <= kMaxLoopChi2;
+  const auto fits = [&](double inflation) {
+    const Matrix4d covariance = inflation * innovation.measurement + innovation.odometry;
+    return innovation.error.dot(covariance.ldlt().solve(innovation.error)) <= kMaxLoopChi2;
+  };
+  return fits(1) ? Agreement::kAgree : fits(kMaxNees) ? Agreement::kNearly : Agreement::kContradict;
 }
 
 // Tests both directions, so that the result does not depend on the order of arrival.
-bool PairEvidence::Agree(const Candidate& k, const Candidate& l) const {
-  return Predicts(l, k) && Predicts(k, l);
+PairEvidence::Agreement PairEvidence::AgreementOf(const Candidate& k, const Candidate& l) const {
+  return std::min(Predicts(l, k), Predicts(k, l));
 }
 
-bool PairEvidence::AgreeAt(int k, int l) const {
-  return k == l || candidates_[std::max(k, l)].agrees[std::min(k, l)];
+PairEvidence::Agreement PairEvidence::AgreementAt(int k, int l) const {
+  return k == l ? Agreement::kAgree : candidates_[std::max(k, l)].agreement[std::min(k, l)];
 }
 
 void PairEvidence::Add(const Measurement& measurement) {
@@ -117,14 +124,16 @@ void PairEvidence::Add(const Measurement& measurement) {
     ForgetOldest();
   }
   for (const Candidate& earlier : candidates_) {
-    candidate.agrees.push_back(Agree(candidate, earlier));
+    candidate.agreement.push_back(AgreementOf(candidate, earlier));
   }
   candidates_.push_back(std::move(candidate));
   Decide();
 }
 
 void PairEvidence::AddToMerge(const Candidate& candidate) {
-  if (std::ranges::all_of(agreeing_, [&](int k) { return Agree(candidate, candidates_[k]); })) {
+  if (std::ranges::all_of(agreeing_, [&](int k) {
+        return AgreementOf(candidate, candidates_[k]) == Agreement::kAgree;
+      })) {
     std::vector<int64_t>& ids = decision_.agreeing;
     ids.insert(std::ranges::upper_bound(ids, candidate.id), candidate.id);
   }
@@ -133,7 +142,7 @@ void PairEvidence::AddToMerge(const Candidate& candidate) {
 void PairEvidence::ForgetOldest() {
   candidates_.erase(candidates_.begin());
   for (Candidate& candidate : candidates_) {
-    candidate.agrees.erase(candidate.agrees.begin());
+    candidate.agreement.erase(candidate.agreement.begin());
   }
 }
 
@@ -147,8 +156,8 @@ void PairEvidence::Save(ByteWriter* writer) const {
     writer->Put(candidate.num_inliers);
     writer->Put(candidate.derived);
     Put(candidate.T_odom_a_odom_b, writer);
-    for (const bool agrees : candidate.agrees) {
-      writer->Put(agrees);
+    for (const Agreement agreement : candidate.agreement) {
+      writer->Put(agreement);
     }
   }
   writer->Put(agreeing_);
@@ -170,9 +179,12 @@ bool PairEvidence::Restore(ByteReader* reader) {
     reader->Get(&candidate.derived);
     Get(reader, &candidate.T_odom_a_odom_b);
     for (size_t earlier = 0; earlier < i; ++earlier) {
-      bool agrees = false;
-      reader->Get(&agrees);
-      candidate.agrees.push_back(agrees);
+      Agreement agreement{};
+      reader->Get(&agreement);
+      if (agreement > Agreement::kAgree) {
+        return false;
+      }
+      candidate.agreement.push_back(agreement);
     }
     if (candidate.node_a < 0 || candidate.node_a >= static_cast<int>(a_->size()) ||
         candidate.node_b < 0 || candidate.node_b >= static_cast<int>(b_->size())) {
@@ -316,23 +328,33 @@ Pose4 PairEvidence::Alignment() const {
   return T;
 }
 
+// Whether it contradicts more than half of the hypothesis.
+bool PairEvidence::IsRival(int candidate) const {
+  const auto contradicted = std::ranges::count_if(
+      agreeing_, [&](int l) { return AgreementAt(candidate, l) == Agreement::kContradict; });
+  return 2 * contradicted > static_cast<int64_t>(agreeing_.size());
+}
+
 void PairEvidence::Decide() {
   std::vector<int> all;
   for (size_t k = 0; k < candidates_.size(); ++k) {
     all.push_back(static_cast<int>(k));
   }
-  agreeing_ = LargestAgreeing(all);
-  // A rival contradicts more than half of the agreeing set; a correct but inaccurate candidate does
-  // not.
-  std::erase_if(all, [&](int k) {
-    const auto agrees = std::ranges::count_if(agreeing_, [&](int l) { return AgreeAt(k, l); });
-    return 2 * agrees >= static_cast<int64_t>(agreeing_.size());
-  });
+  const std::vector<int> before = std::exchange(agreeing_, LargestAgreeing(all));
+  const auto [first_rival, end] =
+      std::ranges::stable_partition(all, [&](int k) { return !IsRival(k); });
+  const std::vector<int> supporters(all.begin(), first_rival), rivals(first_rival, end);
   const std::vector<int> viewpoints = Viewpoints(agreeing_);
+  const bool was_merged = decision_.merge;
   decision_ = {};
   decision_.viewpoints = static_cast<int>(viewpoints.size());
-  decision_.rival_viewpoints = static_cast<int>(Viewpoints(LargestAgreeing(all)).size());
-  decision_.merge = Enough(viewpoints, decision_.rival_viewpoints);
+  decision_.rival_viewpoints = static_cast<int>(Viewpoints(LargestAgreeing(rivals)).size());
+  // Not a hypothesis that its rivals have replaced.
+  const auto lost = std::ranges::count_if(before, [&](int k) { return IsRival(k); });
+  const bool is_kept = was_merged && 2 * lost < static_cast<int64_t>(before.size());
+  decision_.merge =
+      is_kept ? decision_.rival_viewpoints < static_cast<int>(Viewpoints(supporters).size())
+              : Enough(viewpoints, decision_.rival_viewpoints);
   for (const int k : agreeing_) {
     decision_.agreeing.push_back(candidates_[k].id);
   }

@@ -5,11 +5,13 @@
 // Each accepted constraint between the maps is a candidate alignment T_odom_a_odom_b. Two
 // candidates agree when the cycle through them and both maps' odometry closes within its covariance
 // (pairwise consistency: Mangelson et al., ICRA 2018; Mahalanobis distance, four degrees of
-// freedom). The maps are merged if the largest mutually consistent set is large enough, does not
-// come from a single viewpoint, and its best rival set is clearly smaller. A constraint that
-// thinning derived replaces constraints that once sufficed for a merge, so it counts as sufficient
-// evidence by itself; the test against rivals remains. The decision depends only on the set of
-// constraints, not on their order, and a growing rival set can revoke a merge.
+// freedom). The largest mutually consistent set is the hypothesis. A candidate is its rival if it
+// says that the map is elsewhere; one that is only less accurate than it claims supports the
+// hypothesis. The maps are merged if the consistent set is large enough, does not come from a
+// single viewpoint, and its best rival set is clearly smaller. A merge ends when rivals outweigh
+// what supports it: what undoes it is as much evidence as it rests on. A constraint
+// that thinning derived replaces constraints that once sufficed for a merge, so it counts as
+// sufficient evidence by itself; the test against rivals remains.
 //
 // At most 600 candidates are compared. If these merge the maps, the decision is final, and a later
 // constraint that agrees with all agreeing ones is one of them. If not, the oldest are forgotten.
@@ -61,7 +63,7 @@ class PairEvidence {
   struct Decision {
     bool merge = false;
     std::vector<int64_t> agreeing;  // constraint ids, ascending
-    int viewpoints = 0;
+    int viewpoints = 0;             // of all that support the merge
     int rival_viewpoints = 0;
   };
   const Decision& decision() const { return decision_; }
@@ -80,22 +82,29 @@ class PairEvidence {
   std::vector<Innovation> Innovations() const;
 
  private:
+  enum class Agreement : uint8_t {
+    kContradict,  // the map is elsewhere
+    kNearly,      // at the same place, but less accurate than claimed
+    kAgree,
+  };
   struct Candidate : Measurement {
     Pose4 T_odom_a_odom_b;
-    std::vector<bool> agrees;  // one flag per earlier candidate
+    std::vector<Agreement> agreement;  // with each earlier candidate
   };
 
   // kAsClaimed: the drift that the covariances state. kBelievable: with BelievableDrift's minimum.
   enum class Drift : uint8_t { kAsClaimed, kBelievable };
   Innovation Compare(const Candidate& k, const Candidate& l,
                      Drift drift = Drift::kBelievable) const;
-  bool Predicts(const Candidate& l, const Candidate& k) const;
-  bool Agree(const Candidate& k, const Candidate& l) const;
-  bool AgreeAt(int k, int l) const;
+  Agreement Predicts(const Candidate& l, const Candidate& k) const;
+  Agreement AgreementOf(const Candidate& k, const Candidate& l) const;
+  Agreement AgreementAt(int k, int l) const;
+  bool AgreeAt(int k, int l) const { return AgreementAt(k, l) == Agreement::kAgree; }
   // Greedy largest set of mutually agreeing candidates among `among`.
   std::vector<int> LargestAgreeing(std::vector<int> among) const;
   std::vector<int> Viewpoints(const std::vector<int>& candidates) const;
   double SceneExtent(const std::vector<int>& candidates) const;
+  bool IsRival(int candidate) const;
   bool Enough(const std::vector<int>& viewpoints, int rival_viewpoints) const;
   bool DifferentViewpoint(const Candidate& k, const Candidate& l) const;
   int BestMember(const std::vector<int>& agreeing) const;

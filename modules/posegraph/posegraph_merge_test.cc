@@ -284,7 +284,7 @@ TEST(PoseGraph, AWrongMergeOfTheCheckpointIsUndoneByTheRestOfTheJournal) {
     }
     return restored.Update();
   };
-  const PoseGraphUpdate separated = update_with(4);
+  const PoseGraphUpdate separated = update_with(6);
   ASSERT_EQ(separated.states.size(), 2u);
   EXPECT_EQ(separated.states[0].maps, std::vector{first});
   const auto of_second = std::ranges::find(separated.corrections, second, &Correction::map);

@@ -12,7 +12,7 @@
 namespace pangea {
 namespace {
 
-constexpr uint32_t kCheckpointFormat = 5;
+constexpr uint32_t kCheckpointFormat = 6;
 constexpr int64_t kSecond = 1'000'000;
 
 }  // namespace
