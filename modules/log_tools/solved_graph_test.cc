@@ -3,6 +3,7 @@
 
 #include "log_tools/solved_graph.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

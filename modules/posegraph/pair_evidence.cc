@@ -341,9 +341,10 @@ void PairEvidence::Decide() {
     all.push_back(static_cast<int>(k));
   }
   const std::vector<int> before = std::exchange(agreeing_, LargestAgreeing(all));
-  const auto [first_rival, end] =
-      std::ranges::stable_partition(all, [&](int k) { return !IsRival(k); });
-  const std::vector<int> supporters(all.begin(), first_rival), rivals(first_rival, end);
+  std::vector<int> supporters, rivals;
+  for (const int k : all) {
+    (IsRival(k) ? rivals : supporters).push_back(k);
+  }
   const std::vector<int> viewpoints = Viewpoints(agreeing_);
   const bool was_merged = decision_.merge;
   decision_ = {};

@@ -119,7 +119,7 @@ TEST_F(PairEvidenceTest, ACheckpointWithAnUnknownAgreementIsRefused) {
   Add(kT_0_1);
   std::vector<uint8_t> bytes = BytesOf(evidence_);
   const std::vector<uint8_t> agreeing{2, 2, 0, 0, 0};  // the flag, then a count of two
-  const auto flag = std::ranges::search(bytes, agreeing).begin();
+  const auto flag = std::search(bytes.begin(), bytes.end(), agreeing.begin(), agreeing.end());
   ASSERT_NE(flag, bytes.end());
   *flag = 3;
   PairEvidence restored(maps_[0].chain, maps_[1].chain, {});

@@ -278,6 +278,17 @@ void AddQuestions(CLI::App& replay, ReplayArguments* arguments) {
   }
 }
 
+// A session's folder stands for the log that it holds.
+CLI::Validator LogOfFolder() {
+  return {[](std::string& path) {
+            if (std::filesystem::is_directory(path)) {
+              path = (std::filesystem::path(path) / "session.lcm").string();
+            }
+            return std::string();
+          },
+          ""};
+}
+
 }  // namespace
 
 void AddReplayCommand(CLI::App& app, CommandResult* result) {
@@ -286,10 +297,11 @@ void AddReplayCommand(CLI::App& app, CommandResult* result) {
       "replay", "Run the server over the keyframes of captured logs, deterministically");
   replay
       ->add_option("logs", arguments->logs,
-                   "session.lcm or journal.lcm of a session, or logs of pangea-vio "
+                   "session.lcm or journal.lcm of a session, its folder, or logs of pangea-vio "
                    "--out-keyframes; several are "
                    "interleaved as if they had started together")
       ->required()
+      ->transform(LogOfFolder())
       ->check(CLI::ExistingFile);
   AddResultOptions(*replay, arguments.get());
   AddServerOptions(*replay, arguments.get());
@@ -301,10 +313,13 @@ void AddReplayCommand(CLI::App& app, CommandResult* result) {
 void AddReportCommand(CLI::App& app, CommandResult* result) {
   auto arguments = std::make_shared<LogArguments>();
   CLI::App* report = app.add_subcommand(
-      "report", "What a captured server bus amounts to, whoever captured it: nothing is run again");
-  report->add_option("log", arguments->logs, "Log of a server bus, e.g. an lcm-logger's")
+      "report", "The report of a captured server bus, e.g. of a live server: nothing is run again");
+  report
+      ->add_option("log", arguments->logs,
+                   "Log of a server bus, e.g. an lcm-logger's, or a session's folder")
       ->required()
       ->expected(1)
+      ->transform(LogOfFolder())
       ->check(CLI::ExistingFile);
   AddResultOptions(*report, arguments.get());
   report->callback(

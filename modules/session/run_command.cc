@@ -103,7 +103,7 @@ void AddRunCommand(CLI::App& app, CommandResult* result) {
       ->check(Within(1e-3, 1e6) | CLI::IsMember({"max"}))
       ->capture_default_str();
   run->add_option("--journal", arguments->journal,
-                  "The server's journal; one of an earlier session is gone on with (default: "
+                  "The server's journal; one of an earlier session is continued (default: "
                   "journal.lcm in the folder)");
   run->add_option("--port", arguments->first_port,
                   "First UDP port of the session's buses (default: free ones are chosen)")
@@ -120,14 +120,16 @@ void AddListCommand(CLI::App& app) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* list =
       app.add_subcommand("list", "Session files: who is in them, and what they lack to be run");
-  list->add_option("folder", arguments->folder, "Folder of session files")
-      ->check(CLI::ExistingDirectory)
+  list->add_option("folder", arguments->folder, "Folder of session files, or one of them")
+      ->check(CLI::ExistingPath)
       ->capture_default_str();
   list->add_option("--recordings", arguments->recordings,
                    "Folder the recordings are relative to (default: the session file's)");
   list->add_flag("--names", arguments->names, "Names only");
   list->callback([arguments] {
-    const std::vector<fs::path> files = SessionFiles(arguments->folder);
+    const std::vector<fs::path> files = fs::is_regular_file(arguments->folder)
+                                            ? std::vector<fs::path>{arguments->folder}
+                                            : SessionFiles(arguments->folder);
     if (files.empty()) {
       throw std::runtime_error(
           fmt::format("{}: no session files here; name their folder", arguments->folder));

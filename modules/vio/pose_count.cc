@@ -32,9 +32,11 @@ void PoseCount::Add(int64_t utime) {
   late_images_ += utime - *first_utime_ > kStart_us ? 1 : 0;
 }
 
-void PoseCount::AddPose(int64_t utime) {
+void PoseCount::AddPose(int64_t utime, const std::string& suspect) {
   Add(utime);
   ++poses_;
+  is_pose_suspect_ = !suspect.empty();
+  suspect_ = is_pose_suspect_ ? suspect : suspect_;
   poses_since_suspect_ += suspect_.empty() ? 0 : 1;
 }
 
@@ -69,8 +71,12 @@ bool PoseCount::AreFew() const {
 
 std::optional<std::string> PoseCount::WhyFew() const {
   const std::string probably = suspect_.empty() ? "" : "Probably " + suspect_;
-  if (images_ == 0 || !AreFew()) {
+  if (images_ == 0 || !(AreFew() || is_pose_suspect_)) {
     return std::nullopt;
+  }
+  if (!AreFew()) {
+    return fmt::format("the poses are wrong ({} of {} images have one). {}", poses_, images_,
+                       probably);
   }
   if (poses_ == 0) {
     return fmt::format("no pose: the odometry did not start in {} images; at the last: {}{}",

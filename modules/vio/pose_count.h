@@ -11,9 +11,9 @@ namespace pangea::vio {
 
 class PoseCount {
  public:
-  // An image with a pose, and one without.
-  void AddPose(int64_t utime);
-  // `suspect`: what is probably wrong with the calibration; empty: not known.
+  // An image with a pose, and one without. `suspect`: what is probably wrong with the calibration;
+  // empty: not known.
+  void AddPose(int64_t utime, const std::string& suspect);
   void AddNone(int64_t utime, const std::string& reason, const std::string& suspect);
 
   int64_t images() const { return images_; }
@@ -38,6 +38,7 @@ class PoseCount {
   std::map<std::string, Reason> reasons_;  // by their text without numbers
   std::string last_reason_;
   std::string suspect_;
+  bool is_pose_suspect_ = false;  // the newest one
   int64_t images_since_suspect_ = 0;
   int64_t poses_since_suspect_ = 0;
 };

@@ -14,9 +14,9 @@ constexpr int64_t kStep_us = 100'000;
 
 class PoseCountTest : public ::testing::Test {
  protected:
-  void AddPoses(int images) {
+  void AddPoses(int images, const std::string& suspect = "") {
     for (int i = 0; i < images; ++i) {
-      count_.AddPose(utime_ += kStep_us);
+      count_.AddPose(utime_ += kStep_us, suspect);
     }
   }
   void AddNone(int images, const std::string& reason, const std::string& suspect = "") {
@@ -75,6 +75,15 @@ TEST_F(PoseCountTest, ASuspectCountsUntilMostImagesHaveAPoseAgain) {
   EXPECT_THAT(*count_.WhyFew(), HasSubstr("few poses: 500 of 550 images have one. Probably the"));
   AddPoses(50);
   EXPECT_FALSE(count_.WhyFew());
+}
+
+TEST_F(PoseCountTest, SuspectPosesAreNoPoses) {
+  AddPoses(500);
+  AddPoses(10, "the focal length is wrong");
+  EXPECT_EQ(*count_.WhyFew(),
+            "the poses are wrong (510 of 510 images have one). Probably the focal length is wrong");
+  AddPoses(1);
+  EXPECT_FALSE(count_.WhyFew()) << "of another map, in which it is right";
 }
 
 }  // namespace

@@ -121,7 +121,7 @@ void VioProcess::Handle(const VioOutput& output) {
   }
   const bool tracking = output.state == EstimatorState::kTracking;
   if (tracking) {
-    pose_count_.AddPose(output.utime);
+    pose_count_.AddPose(output.utime, output.suspect);
   } else {
     pose_count_.AddNone(output.utime, output.reason, output.suspect);
   }
@@ -134,6 +134,7 @@ void VioProcess::Handle(const VioOutput& output) {
   doubt_ = !tracking                 ? ""
            : saturated_              ? kSaturated
            : output.imu_contradicted ? kContradicted
+           : !output.suspect.empty() ? "probably " + output.suspect
                                      : UnknownScale(output.scale_sigma);
   if (output.imu_contradicted) {
     node_.Count("imu_contradicted");

@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
+#include <functional>
+#include <iterator>
 #include <limits>
 #include <utility>
 
@@ -17,6 +20,11 @@ using Eigen::Quaterniond;
 
 // A mistake is named only if the cost without it is below this share of the cost as given.
 constexpr double kFaultShare = 0.6;
+// Summed over several windows, the best focal length's cost is 0.95 to 1 of the given one's if that
+// is right.
+constexpr double kFocalShare = 0.85;
+constexpr double kCheckedFactors[] = {1, 0.72, 0.85, 1.18, 1.4};
+constexpr size_t kCheckedPairs = 4;  // one in so many
 constexpr double kFocalFactors[] = {0.5, 0.6, 0.72, 0.85, 1.18, 1.4, 1.7, 2};
 constexpr double kFocalStep = 0.09;  // half of the step between these
 constexpr double kSameAngle_rad = 0.1;
@@ -81,9 +89,9 @@ std::vector<CalibrationFault> FaultsOfRotations(const CameraModel& camera) {
 }
 
 // In pixels, so that cameras of other focal lengths can be compared. Infinite without tracks.
-double CostWithout(const FramesOf& frames_of, const CalibrationFault& fault,
-                   const ImuNoise& noise) {
-  const auto cost = GyroCost(WithoutFault(frames_of, fault), fault.camera.T_body_cam, noise);
+double CostWithout(const FramesOf& frames_of, const CalibrationFault& fault, const ImuNoise& noise,
+                   size_t every = 1) {
+  const auto cost = GyroCost(WithoutFault(frames_of, fault), fault.camera.T_body_cam, noise, every);
   return cost ? *cost / fault.camera.PixelAngle() : std::numeric_limits<double>::infinity();
 }
 
@@ -137,6 +145,28 @@ std::optional<CalibrationFault> FaultByRotations(const FramesOf& frames_of,
   return best && best->camera.fx != camera.fx
              ? BestFocalLength(frames_of, camera, best->camera.fx / camera.fx, noise)
              : best;
+}
+
+FocalLengthCheck::FocalLengthCheck(const CameraModel& camera, const ImuNoise& noise)
+    : camera_(camera), noise_(noise), costs_(std::size(kCheckedFactors)) {}
+
+void FocalLengthCheck::Add(const FramesOf& frames_of) {
+  std::vector<double> costs;
+  for (const double factor : kCheckedFactors) {
+    costs.push_back(
+        CostWithout(frames_of, WrongFocalLength(camera_, factor), noise_, kCheckedPairs));
+  }
+  if (std::ranges::all_of(costs, [](double cost) { return std::isfinite(cost); })) {
+    std::ranges::transform(costs_, costs, costs_.begin(), std::plus());
+    ++windows_;
+  }
+}
+
+std::optional<CalibrationFault> FocalLengthCheck::Found() const {
+  const auto best = std::ranges::min_element(costs_);
+  return is_complete() && *best < kFocalShare * costs_.front()
+             ? std::optional(WrongFocalLength(camera_, kCheckedFactors[best - costs_.begin()]))
+             : std::nullopt;
 }
 
 CalibrationFault NegatedAccelerometer(const CameraModel& camera) {

@@ -34,6 +34,25 @@ std::vector<StartFrame> WithoutFault(const FramesOf& frames_of, const Calibratio
 std::optional<CalibrationFault> FaultByRotations(const FramesOf& frames_of,
                                                  const CameraModel& camera, const ImuNoise& noise);
 
+// Sums up, over the first windows after the start, how well each focal length fits the gyro's
+// rotations. A single window tells less: rotation and translation look alike in it.
+class FocalLengthCheck {
+ public:
+  FocalLengthCheck(const CameraModel& camera, const ImuNoise& noise);
+  void Add(const FramesOf& frames_of);
+  bool is_complete() const { return windows_ == kWindows; }
+  // Once it is complete, a focal length that fits clearly better than the given one.
+  std::optional<CalibrationFault> Found() const;
+
+ private:
+  static constexpr int kWindows = 4;
+
+  CameraModel camera_;
+  ImuNoise noise_;
+  std::vector<double> costs_;  // of each focal length, the given one first; summed over the windows
+  int windows_ = 0;
+};
+
 CalibrationFault NegatedAccelerometer(const CameraModel& camera);
 
 }  // namespace pangea::vio

@@ -88,6 +88,24 @@ TEST_F(CalibrationFaults, FindsAFocalLengthThatIsFarOff) {
   }
 }
 
+TEST_F(CalibrationFaults, SeveralWindowsTellTheFocalLengthThoughTheStartSucceeded) {
+  for (const double wrong : {0.75, 1.0, 1.31}) {
+    camera_.fx = camera_.fy = wrong * kFocalLength_px;
+    FocalLengthCheck check(camera_, ImuNoise{});
+    for (uint64_t seed = 1; !check.is_complete(); ++seed) {
+      EXPECT_FALSE(check.Found());
+      ASSERT_LT(seed, 10u);
+      frames_ = Record(Lively, 0, kStartRaySigma, 0.1, seed).frames;
+      check.Add(frames_of_);
+    }
+    const auto fault = check.Found();
+    ASSERT_EQ(fault.has_value(), wrong != 1) << wrong;
+    if (fault) {
+      EXPECT_NEAR(fault->camera.fx / kFocalLength_px, 1, 0.1) << wrong;
+    }
+  }
+}
+
 TEST_F(CalibrationFaults, FindsWrongAxesOfTheCamera) {
   for (const Quaterniond& rotation : AxisAlignedRotations()) {
     if (rotation.angularDistance(Quaterniond::Identity()) < 0.1) {

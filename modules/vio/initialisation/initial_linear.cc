@@ -84,10 +84,10 @@ double EpipolarCost(const RotationPair& pair, const Vector3d& bias_change) {
 }
 
 std::vector<RotationPair> MakePairs(std::span<const StartFrame> frames, const Rigid3& T_body_cam,
-                                    const ImuNoise& noise) {
+                                    const ImuNoise& noise, size_t every = 1) {
   std::vector<RotationPair> pairs;
   constexpr size_t kSpan = 4;  // frames between the two images: the bias must be visible
-  for (size_t i = 0; i + kSpan < frames.size(); ++i) {
+  for (size_t i = 0; i + kSpan < frames.size(); i += every) {
     const StartFrame& a = frames[i];
     const StartFrame& b = frames[i + kSpan];
     RotationPair pair;
@@ -270,8 +270,8 @@ std::optional<Vector3d> SolveGyroBias(std::span<const StartFrame> frames, const 
 }
 
 std::optional<double> GyroCost(std::span<const StartFrame> frames, const Rigid3& T_body_cam,
-                               const ImuNoise& noise) {
-  const std::vector<RotationPair> pairs = MakePairs(frames, T_body_cam, noise);
+                               const ImuNoise& noise, size_t every) {
+  const std::vector<RotationPair> pairs = MakePairs(frames, T_body_cam, noise, every);
   if (pairs.size() < kMinPairs) {
     return std::nullopt;
   }

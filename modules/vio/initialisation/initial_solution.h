@@ -30,9 +30,10 @@ std::optional<Eigen::Vector3d> SolveGyroBias(std::span<const StartFrame> frames,
                                              const Rigid3& T_body_cam, const ImuNoise& noise);
 
 // How badly the gyro's rotations satisfy the epipolar constraints with that bias: the mean of the
-// pairs' residuals, as angles (radians). Empty if there are too few tracks.
+// pairs' residuals, as angles (radians). Empty if there are too few tracks. `every`: one in so many
+// pairs is used, for less work.
 std::optional<double> GyroCost(std::span<const StartFrame> frames, const Rigid3& T_body_cam,
-                               const ImuNoise& noise);
+                               const ImuNoise& noise, size_t every = 1);
 
 // Time by which the images were taken later than their stamps say (seconds, IMU clock), from
 // rotations alone: the offset at which the gyro's rotations satisfy the epipolar constraints best.

@@ -55,6 +55,7 @@ constexpr double kMaxAccelBias = 0.8 / 0.15;  // of accel_bias_sigma
 constexpr int kDoubtful = 5;
 constexpr int kSearching = 8;
 constexpr double kDoubtfulInterval_s = 0.8;
+constexpr double kCheckInterval_s = 5;  // of the focal length, after the start
 
 // Of the tracks that both frames have, in ascending order.
 std::vector<double> Displacements(const TrackedFrame& a, const TrackedFrame& b) {
@@ -137,17 +138,30 @@ Initialiser::Initialiser(const CameraModel& camera, const ImuNoise& noise, doubl
       noise_(noise),
       pixel_sigma_(pixel_sigma),
       sigmas_(sigmas),
-      stationary_(stationary) {}
+      stationary_(stationary),
+      focal_length_check_(camera, noise) {}
 
 InitialResult Initialiser::AddFrame(const TrackedFrame& frame, std::span<const ImuSample> imu,
                                     double stamp_sigma_s) {
   sigmas_.stamp_s = stamp_sigma_s;
+  if (auto why_not = Collect(frame, imu)) {
+    return {std::nullopt, *why_not, false, suspect_};
+  }
+  InitialResult result = Try();
+  why_not_ = result.reason;
+  suspect_ = result.state ? "" : suspect_;
+  return result;
+}
+
+// Returns the reason if there is nothing new to start with.
+std::optional<std::string> Initialiser::Collect(const TrackedFrame& frame,
+                                                std::span<const ImuSample> imu) {
   samples_.insert(samples_.end(), imu.begin(), imu.end());
   if (samples_.empty() || samples_.back().utime < frame.utime) {
-    return {std::nullopt, "no inertial samples up to the image's time"};
+    return "no inertial samples up to the image's time";
   }
   if (!frames_.empty() && SpanSeconds(frames_.back().utime, frame.utime) < kFrameSpacing_s) {
-    return {std::nullopt, why_not_};
+    return why_not_;
   }
   frames_.push_back(frame);
   while (SpanSeconds(frames_.front().utime, frame.utime) > kMaxSpan_s) {
@@ -155,14 +169,26 @@ InitialResult Initialiser::AddFrame(const TrackedFrame& frame, std::span<const I
   }
   DropImagesBeforeSamples();
   if (frames_.empty()) {
-    return {std::nullopt, "no inertial samples from before the image"};
+    return "no inertial samples from before the image";
   }
   std::erase_if(samples_, [&](const ImuSample& sample) {
     return SpanSeconds(sample.utime, frames_.front().utime) > kSampleMargin_s;
   });
-  InitialResult result = Try();
-  why_not_ = result.reason;
-  return result;
+  return std::nullopt;
+}
+
+std::string Initialiser::CheckFocalLength(const TrackedFrame& frame,
+                                          std::span<const ImuSample> imu) {
+  if (focal_length_check_.is_complete() || Collect(frame, imu) ||
+      SpanSeconds(last_attempt_utime_, frame.utime) < kCheckInterval_s) {
+    return suspect_;
+  }
+  last_attempt_utime_ = frame.utime;
+  focal_length_check_.Add([this](const CameraModel& camera) { return StartFrames(camera, 0); });
+  if (const auto fault = focal_length_check_.Found()) {
+    suspect_ = fault->text;
+  }
+  return suspect_;
 }
 
 // The motion from such an image to the next one is not known.

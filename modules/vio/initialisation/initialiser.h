@@ -64,8 +64,12 @@ class Initialiser {
                          double stamp_sigma_s);
   // Images and IMU have not fitted for a while: the gyro's rotations may be wrong for the camera.
   bool InDoubt() const;
+  // After the start, with the same frames as before: some starts with a wrong focal length succeed.
+  // Returns what is probably wrong; empty: nothing is known to be.
+  std::string CheckFocalLength(const TrackedFrame& frame, std::span<const ImuSample> imu);
 
  private:
+  std::optional<std::string> Collect(const TrackedFrame& frame, std::span<const ImuSample> imu);
   void DropImagesBeforeSamples();
   InitialResult Try();
   std::optional<InitialState> TryStationary() const;
@@ -88,7 +92,8 @@ class Initialiser {
   int contradictions_ = 0;          // attempts at which images and IMU did not fit, less the others
   int64_t last_attempt_utime_ = 0;  // at a moving start
   std::optional<CalibrationFault> possible_fault_;  // found once
-  std::string suspect_;                             // found twice
+  FocalLengthCheck focal_length_check_;
+  std::string suspect_;  // found twice, or by that check
 };
 
 }  // namespace pangea::vio

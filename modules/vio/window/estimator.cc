@@ -360,6 +360,9 @@ FrameResult Estimator::Impl::AddFrame(const TrackedFrame& frame, std::span<const
   stamps.AddImage(frame.utime);
   std::optional<std::string> wrong;
   if (started) {
+    TrackedFrame shifted = frame;
+    shifted.utime = ImuTime(frame.utime);
+    result.suspect = initialiser.CheckFocalLength(shifted, imu);
     wrong = Track(frame, &result);
   } else {
     TryStart(frame, imu, &result);
