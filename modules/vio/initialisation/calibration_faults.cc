@@ -156,14 +156,14 @@ void FocalLengthCheck::Add(const FramesOf& frames_of) {
     costs.push_back(
         CostWithout(frames_of, WrongFocalLength(camera_, factor), noise_, kCheckedPairs));
   }
-  if (std::ranges::all_of(costs, [](double cost) { return std::isfinite(cost); })) {
-    std::ranges::transform(costs_, costs, costs_.begin(), std::plus());
+  if (std::all_of(costs.begin(), costs.end(), [](double cost) { return std::isfinite(cost); })) {
+    std::transform(costs_.begin(), costs_.end(), costs.begin(), costs_.begin(), std::plus());
     ++windows_;
   }
 }
 
 std::optional<CalibrationFault> FocalLengthCheck::Found() const {
-  const auto best = std::ranges::min_element(costs_);
+  const auto best = std::min_element(costs_.begin(), costs_.end());
   return is_complete() && *best < kFocalShare * costs_.front()
              ? std::optional(WrongFocalLength(camera_, kCheckedFactors[best - costs_.begin()]))
              : std::nullopt;
