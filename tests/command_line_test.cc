@@ -72,6 +72,19 @@ TEST(SessionList, ShowsTheSessionsAtHand) {
   EXPECT_THAT(outcome.output, HasSubstr("missing: agent 1: recording "));
   outcome = RunCommand("pangea-session list " PANGEA_SOURCE_DIR "/sessions --names");
   EXPECT_THAT(outcome.output, HasSubstr("demo\ntable2_MH_01\n"));
+  outcome = RunCommand("pangea-session list " PANGEA_SOURCE_DIR "/sessions/demo.yaml --names");
+  EXPECT_EQ(outcome.output, "demo\n");
+}
+
+TEST(Log, ASessionsFolderStandsForItsLog) {
+  const fs::path folder = FreshFolder("report_of_a_folder");
+  Outcome outcome = RunCommand("pangea-session report " PANGEA_SOURCE_DIR "/logs/two_walks --out " +
+                               (folder / "out").string());
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_TRUE(fs::exists(folder / "out" / "report.json"));
+  outcome = RunCommand("pangea-session report " + folder.string());
+  EXPECT_NE(outcome.exit_code, 0);
+  EXPECT_THAT(outcome.output, HasSubstr("session.lcm"));
 }
 
 // An installed program without a folder of sessions nearby uses the installed ones.

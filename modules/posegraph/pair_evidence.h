@@ -63,7 +63,7 @@ class PairEvidence {
   struct Decision {
     bool merge = false;
     std::vector<int64_t> agreeing;  // constraint ids, ascending
-    int viewpoints = 0;             // of all that support the merge
+    int viewpoints = 0;             // of these
     int rival_viewpoints = 0;
   };
   const Decision& decision() const { return decision_; }

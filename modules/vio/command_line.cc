@@ -146,7 +146,7 @@ int RunCommandLine(int argc, char** argv) {
   OptionsArguments options(app);
   app.footer(fmt::format(
       "Exit code: 0; 1 when something could not be done; {} when a recording was played to its end "
-      "and fewer than half of its images have a pose.",
+      "and fewer than half of its images have a pose, or the poses are doubtful.",
       kFewPoses));
   CLI11_PARSE(app, argc, argv);
   try {

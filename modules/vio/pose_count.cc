@@ -15,8 +15,7 @@ constexpr size_t kMostReasons = 3;
 
 constexpr char kUnknown[] =
     "Likely causes: the accelerometer's or the gyroscope's sign or axes, T_BS (camera to body), "
-    "the "
-    "intrinsics, stamps of two clocks";
+    "the intrinsics, stamps of two clocks";
 
 std::string WithoutNumbers(std::string text) {
   std::erase_if(text, [](unsigned char c) { return std::isdigit(c) != 0; });
@@ -75,7 +74,7 @@ std::optional<std::string> PoseCount::WhyFew() const {
     return std::nullopt;
   }
   if (!AreFew()) {
-    return fmt::format("the poses are wrong ({} of {} images have one). {}", poses_, images_,
+    return fmt::format("the poses are doubtful ({} of {} images have one). {}", poses_, images_,
                        probably);
   }
   if (poses_ == 0) {

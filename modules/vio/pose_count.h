@@ -19,7 +19,8 @@ class PoseCount {
   int64_t images() const { return images_; }
   int64_t poses() const { return poses_; }
   // A text for people if fewer than half of the images have a pose, apart from the first seconds,
-  // in which an odometry may start.
+  // in which an odometry may start; or of those since a suspect came up; or if the newest pose has
+  // a suspect.
   std::optional<std::string> WhyFew() const;
 
  private:

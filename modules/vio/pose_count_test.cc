@@ -77,11 +77,12 @@ TEST_F(PoseCountTest, ASuspectCountsUntilMostImagesHaveAPoseAgain) {
   EXPECT_FALSE(count_.WhyFew());
 }
 
-TEST_F(PoseCountTest, SuspectPosesAreNoPoses) {
+TEST_F(PoseCountTest, SuspectPosesAreDoubtful) {
   AddPoses(500);
   AddPoses(10, "the focal length is wrong");
-  EXPECT_EQ(*count_.WhyFew(),
-            "the poses are wrong (510 of 510 images have one). Probably the focal length is wrong");
+  EXPECT_EQ(
+      *count_.WhyFew(),
+      "the poses are doubtful (510 of 510 images have one). Probably the focal length is wrong");
   AddPoses(1);
   EXPECT_FALSE(count_.WhyFew()) << "of another map, in which it is right";
 }

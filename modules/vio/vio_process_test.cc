@@ -274,14 +274,9 @@ TEST_F(VioProcessTest, SaysWhyThereIsNoPose) {
   VioProcess process(bus_, options_, 0);
   EXPECT_EQ(process.WhyFewPoses(), "no pose: no image came to the odometry");
   process.Open(world_.camera(), ImuNoise{});
-  const cv::Mat image = RandomTexture(752, 480, 11);
-  for (int64_t utime = 0; utime < 3'000'000; utime += kImageStep_us) {
-    std::vector<ImuSample> imu;
-    for (; next_imu_ <= utime; next_imu_ += kImuStep_us) {
-      imu.push_back({next_imu_, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()});
-    }
-    process.AddTracks(world_.Frame(utime), image, imu);
-  }
+  Play(process, 0, 3, [](int64_t utime) {
+    return ImuSample{utime, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+  });
   EXPECT_EQ(
       process.WhyFewPoses(),
       "no pose: the odometry did not start in 30 images; at the last: the accelerometer shows "
@@ -341,14 +336,9 @@ TEST_F(VioProcessTest, SaysThatItIsStationaryUntilItMoves) {
 TEST_F(VioProcessTest, AGyroscopeInDegreesIsNamed) {
   VioProcess process(bus_, options_, 0);
   process.Open(world_.camera(), ImuNoise{});
-  const cv::Mat image = RandomTexture(752, 480, 11);
-  for (int64_t utime = 0; utime < 2'000'000; utime += kImageStep_us) {
-    std::vector<ImuSample> imu;
-    for (; next_imu_ <= utime; next_imu_ += kImuStep_us) {
-      imu.push_back({next_imu_, Eigen::Vector3d(0, 20, 0), Eigen::Vector3d(0, 0, 9.8)});
-    }
-    process.AddTracks(world_.Frame(utime), image, imu);
-  }
+  Play(process, 0, 2, [](int64_t utime) {
+    return ImuSample{utime, Eigen::Vector3d(0, 20, 0), Eigen::Vector3d(0, 0, 9.8)};
+  });
   EXPECT_THAT(*process.WhyFewPoses(),
               ::testing::HasSubstr("20.0 rad/s on average: is it in degrees"));
 }
@@ -356,20 +346,15 @@ TEST_F(VioProcessTest, AGyroscopeInDegreesIsNamed) {
 TEST_F(VioProcessTest, AWrongSignIsNamedWithTheMend) {
   VioProcess process(bus_, options_, 0);
   process.Open(world_.camera(), ImuNoise{});
-  const cv::Mat image = RandomTexture(752, 480, 11);
-  for (int64_t utime = 0; utime < 8'000'000; utime += kImageStep_us) {
-    std::vector<ImuSample> imu;
-    for (; next_imu_ <= utime; next_imu_ += kImuStep_us) {
-      imu.push_back(World::Sample(next_imu_));
-      imu.back().accel *= -1;
-    }
-    process.AddTracks(world_.Frame(utime), image, imu);
-  }
+  Play(process, 0, 8, [](int64_t utime) {
+    ImuSample sample = World::Sample(utime);
+    sample.accel *= -1;
+    return sample;
+  });
   const char mend[] =
       "robably the accelerometer's sign is wrong: a stationary one shows +9.8 m/s^2 upwards; "
       "negate its three axes";
   EXPECT_THAT(*process.WhyFewPoses(), ::testing::HasSubstr(mend));
-  bus_.Drain();
   EXPECT_THAT(poses_.back().reason, ::testing::HasSubstr(mend));
 }
 

@@ -76,13 +76,14 @@ VioProcessTest::VioProcessTest() : world_(1) {
   });
 }
 
-void VioProcessTest::Play(VioProcess& process, double from_s, double to_s) {
+void VioProcessTest::Play(VioProcess& process, double from_s, double to_s,
+                          const std::function<ImuSample(int64_t)>& sample_at) {
   const cv::Mat image = RandomTexture(752, 480, 11);
   for (int64_t utime = static_cast<int64_t>(1e6 * from_s); utime < static_cast<int64_t>(1e6 * to_s);
        utime += kImageStep_us) {
     std::vector<ImuSample> imu;
     for (; next_imu_ <= utime; next_imu_ += kImuStep_us) {
-      imu.push_back(World::Sample(next_imu_));
+      imu.push_back(sample_at(next_imu_));
     }
     process.AddTracks(world_.Frame(utime), image, imu);
   }

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
 #include <opencv2/core.hpp>
 #include <string>
 #include <vector>
@@ -42,7 +43,8 @@ class World {
 class VioProcessTest : public ::testing::Test {
  protected:
   VioProcessTest();
-  void Play(VioProcess& process, double from_s, double to_s);
+  void Play(VioProcess& process, double from_s, double to_s,
+            const std::function<ImuSample(int64_t)>& sample_at = World::Sample);
   int64_t Counter(const std::string& name) const;
   int64_t Refused(const std::string& reason) const;
 

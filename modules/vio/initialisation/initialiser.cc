@@ -149,7 +149,11 @@ InitialResult Initialiser::AddFrame(const TrackedFrame& frame, std::span<const I
   }
   InitialResult result = Try();
   why_not_ = result.reason;
-  suspect_ = result.state ? "" : suspect_;
+  if (result.state) {
+    suspect_.clear();
+    last_attempt_utime_ = frame.utime;
+  }
+  result.suspect = suspect_;
   return result;
 }
 
@@ -219,12 +223,11 @@ InitialResult Initialiser::Try() {
   }
   const int64_t now = frames_.back().utime;
   if (InDoubt() && SpanSeconds(last_attempt_utime_, now) < kDoubtfulInterval_s) {
-    return {std::nullopt, why_not_, false, suspect_};
+    return {std::nullopt, why_not_};
   }
   last_attempt_utime_ = now;
   InitialResult result = TryMoving();
   NoteOutcome(result);
-  result.suspect = suspect_;
   return result;
 }
 

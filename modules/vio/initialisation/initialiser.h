@@ -90,7 +90,7 @@ class Initialiser {
   double time_offset_change_s_ = 0;
   std::string why_not_ = "collecting images";  // result of the newest attempt
   int contradictions_ = 0;          // attempts at which images and IMU did not fit, less the others
-  int64_t last_attempt_utime_ = 0;  // at a moving start
+  int64_t last_attempt_utime_ = 0;  // at a moving start; then of the start, of each check
   std::optional<CalibrationFault> possible_fault_;  // found once
   FocalLengthCheck focal_length_check_;
   std::string suspect_;  // found twice, or by that check
