@@ -14,7 +14,7 @@ from pathlib import Path
 
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from real_lib import colmap, constraints, linked_copy, measure, tables, trajectory  # noqa: E402
+from real_lib import colmap, constraints, funnel, linked_copy, measure, tables, trajectory  # noqa: E402
 from real_lib import rotations as rot  # noqa: E402
 from real_lib.alignment import centred, largest_eigenvector, rmse  # noqa: E402
 from real_lib.plan import Plan  # noqa: E402
@@ -182,7 +182,7 @@ class FilesTest(unittest.TestCase):
 
     def plan(self, **given):
         options = {"recording": str(self.mav0.parent), "bin": ".", "work": str(self.work / "out"), "seconds": None, "only": [],
-                   "groundtruth": None, "reference": None, "every": 8, "starts": [0.0], "halves": False, "sensor_yaml": [], "set": []}
+                   "groundtruth": None, "reference": None, "every": 8, "starts": [0.0], "halves": False, "funnel": False, "sensor_yaml": [], "set": []}
         plan = Plan(argparse.Namespace(**{**options, **given}))
         plan.make()
         return plan
@@ -225,6 +225,42 @@ class FilesTest(unittest.TestCase):
         (stamp, pose), = colmap.read_model(self.work / "images.txt", {"a.png": 1.0})
         self.assertEqual(stamp, 1.0)
         self.assertLess(math.dist(pose[1], T_ref_cam[1]), 1e-9)
+
+    def test_funnel_of_a_log(self):
+        def event(channel, data):
+            return struct.pack(">IqqII", 0xEDA1DA01, 0, 0, len(channel), len(data)) + channel.encode() + data
+
+        def text(words):
+            return struct.pack(">i", len(words) + 1) + words.encode() + b"\0"
+
+        def place_match(query, matches, rejected=()):
+            data = struct.pack(">8xiqih", 1, 77, query, len(matches))
+            for match in matches:
+                data += struct.pack(">iqibfh4h", 1, 77, match, 1, 0.5, 2, 0, 1, 2, 3)
+            return event("PLACE_MATCH", data + struct.pack(">h", len(rejected)) + b"".join(map(text, rejected)))
+
+        def constraint(older, newer, good, reason):
+            ends = struct.pack(">8xqiqiiqibb", 1, 1, 77, older, 1, 77, newer, 1, good)
+            return event("CONSTRAINT", ends + text(reason))
+
+        log = self.work / "session.lcm"
+        log.write_bytes(b"".join([
+            *(event("KEYFRAME_1", struct.pack(">8xiqiq", 1, 77, k, 10_000_000 * k)) for k in range(6)),
+            place_match(3, [0], ["1/77#1: 7 corner matches", "1/77#2: 9 of 30 matches agree on a pose"]),
+            place_match(4, [0, 1]), constraint(0, 3, False, "too few inliers"), constraint(0, 4, True, ""),
+            constraint(1, 4, False, "too few matched points with a depth")]))
+        pairs = [(0.1, 30), (10, 29.9), (20, 30), (0, 40), (10, 40), (0, 50.1), (0, 77)]
+        found = funnel.funnel(log, pairs)
+        self.assertEqual(found["reached"], {"seen": 6, "retrieved": 5, "matched": 4, "epipolar": 3, "guessed": 2, "accepted": 1})
+        self.assertEqual(found["lost"], {"corner matches": 1, "of matches agree on a pose": 1, "too few inliers": 1, "not retrieved": 1,
+                                         "too few matched points with a depth": 1})
+        self.assertIn("| halves | 6 | 5 | 4 | 3 | 2 | 1 |", funnel.table({"halves": found}))
+
+    def test_images_that_share_points_are_covisible(self):
+        images = self.work / "images.txt"
+        images.write_text("# list\n1 1 0 0 0 0 0 0 1 a.png\n0 0 5 1 1 6 2 2 -1\n2 1 0 0 0 0 0 0 1 b.png\n0 0 6 1 1 5 2 2 -1 3 3 9\n"
+                          "3 1 0 0 0 0 0 0 1 c.png\n0 0 5\n")
+        self.assertEqual(list(colmap.covisible(images, {"a.png": 0.0, "b.png": 10.5, "c.png": 9.0})), [(0.0, 10.5, 2)])
 
     def test_constraints_of_a_log(self):
         def event(channel, data):

@@ -16,6 +16,7 @@
 #include "pangea/imu_t.hpp"
 #include "pangea/journal_file_t.hpp"
 #include "pangea/keyframe_2_t.hpp"
+#include "pangea/keyframe_3_t.hpp"
 #include "pangea/keyframe_t.hpp"
 #include "pangea/landmarks_t.hpp"
 #include "pangea/map_state_t.hpp"

@@ -17,6 +17,7 @@ from real_lib import trajectory  # noqa: E402
 
 FEATURES = 2000  # per image: the time to match them on a CPU grows with the square
 FEW = 60  # images: up to this number all pairs are matched
+APART_S = 10  # of a revisit
 OVERLAP = 12  # number of following images with which each image is matched
 
 
@@ -40,14 +41,14 @@ def colmap(command, **arguments):
     subprocess.run(["colmap", command, *words], check=True)
 
 
-def reconstruct(mav0, images, work):
+def reconstruct(mav0, images, work, exhaustive):
     database, listed = work / "database.db", work / "images.txt"
     listed.write_text("\n".join(images) + "\n")
     model, parameters = camera(mav0 / "cam0/sensor.yaml")
     folder = mav0 / "cam0/data"
     colmap("feature_extractor", database_path=database, image_path=folder, image_list_path=listed, ImageReader__single_camera=1,
            ImageReader__camera_model=model, ImageReader__camera_params=parameters, SiftExtraction__use_gpu=0, SiftExtraction__max_num_features=FEATURES)
-    if len(images) <= FEW:
+    if exhaustive or len(images) <= FEW:
         colmap("exhaustive_matcher", database_path=database, SiftMatching__use_gpu=0)
     else:
         colmap("sequential_matcher", database_path=database, SiftMatching__use_gpu=0, SequentialMatching__overlap=OVERLAP)
@@ -56,6 +57,16 @@ def reconstruct(mav0, images, work):
     for found in sorted((work / "models").iterdir()):
         colmap("model_converter", input_path=found, output_path=found, output_type="TXT")
         yield found / "images.txt"
+
+
+def covisible(images_txt, stamps):
+    """(earlier stamp, later stamp, number of shared points) of the images more than APART_S apart."""
+    rows = [line.split() for line in images_txt.read_text().splitlines() if not line.startswith("#")]
+    points = sorted((stamps[pose[-1]], set(seen[2::3]) - {"-1"}) for pose, seen in zip(rows[::2], rows[1::2]))
+    for i, (first, of_first) in enumerate(points):
+        for second, of_second in points[i + 1:]:
+            if second - first > APART_S and (shared := len(of_first & of_second)):
+                yield first, second, shared
 
 
 def read_model(images_txt, stamps):
@@ -75,14 +86,19 @@ def main():
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--every", type=int, required=True, metavar="N")
     parser.add_argument("--seconds", type=float, help="only the first ones")
+    parser.add_argument("--exhaustive", action="store_true", help="match all pairs, and write covisible.csv: stamps of revisits, shared points")
     options = parser.parse_args()
     mav0 = mav0_of(options.recording)
     images = chosen(mav0, options.every, options.seconds)
-    models = [read_model(found, images) for found in reconstruct(mav0, images, options.out)]
+    found = list(reconstruct(mav0, images, options.out, options.exhaustive))
+    models = [read_model(file, images) for file in found]
     models.sort(key=len, reverse=True)
     text = [f"# T_ref_cam by COLMAP of every {options.every}th image: {sum(map(len, models))} of {len(images)} joined; up to scale"]
     text += [f"{trajectory.PIECE_MARK}\n{trajectory.tum(model)}" for model in models]
     (options.out / "reference.colmap.tum").write_text("\n".join(text))
+    if options.exhaustive:
+        pairs = [pair for file in found for pair in covisible(file, images)]
+        (options.out / "covisible.csv").write_text("".join(f"{a:.6f},{b:.6f},{shared}\n" for a, b, shared in pairs))
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ from accuracy_lib.jobs import OUT, Command, Job
 
 HERE = Path(__file__).resolve().parent
 REFERENCE = "reference.colmap.tum"
+MOST_IMAGES = 140
 
 
 @dataclass(eq=False)
@@ -28,6 +29,7 @@ class Plan(accuracy.Plan):
         self.source = Path(options.recording).resolve()
         self.recording = self.source
         self.reference_job = None
+        self.covisible_job = None
 
     @staticmethod
     def start_name(start):
@@ -36,6 +38,8 @@ class Plan(accuracy.Plan):
     def make(self):
         copy = self._changed_copy()
         self._reference()
+        if self.options.funnel:
+            self._covisible()
         for start in self.options.starts:
             self._server(self.WHERE, self.start_name(start), [self._run(self.start_name(start), 1, copy, start)])
         if self.options.halves:
@@ -69,6 +73,14 @@ class Plan(accuracy.Plan):
         script = HERE / "colmap.py"
         argv = [sys.executable, str(script), str(self.source), "--out", OUT, "--every", str(self.options.every)]
         self.reference_job = self._added(Job("reference", self.source.name, self.work / "reference", [Command(argv)],
+                                             outside=[script, self.mav0() / "cam0/data.csv"], alone=True))
+
+    def _covisible(self):
+        """All pairs of at most MOST_IMAGES images: the time grows with the square of their number."""
+        script = HERE / "colmap.py"
+        every = -(-len(stamps(self.mav0())) // MOST_IMAGES)
+        argv = [sys.executable, str(script), str(self.source), "--out", OUT, "--every", str(every), "--exhaustive"]
+        self.covisible_job = self._added(Job("covisible", self.source.name, self.work / "covisible", [Command(argv)],
                                              outside=[script, self.mav0() / "cam0/data.csv"], alone=True))
 
     def _added(self, job):

@@ -5,6 +5,7 @@ from accuracy_lib.metrics import read_json
 from real_lib import rotations as rot
 from real_lib import trajectory
 from real_lib.constraints import accepted
+from real_lib.funnel import covisible, funnel
 from real_lib.measure import best_shift, check_constraints, measure
 
 
@@ -33,6 +34,15 @@ class Results:
 
     def halves(self, order):
         return self._of_server(f"halves_{order}")
+
+    def funnels(self):
+        """{name of a session: funnel} of those that ended well."""
+        job = self.plan.covisible_job
+        if not job or not job.ended_well:
+            return {}
+        true_pairs = covisible(job.folder / "covisible.csv")
+        servers = {name: server for (where, name), (server, _) in self.plan.servers.items() if where == self.plan.WHERE}
+        return {name: funnel(server.folder / "session.lcm", true_pairs) for name, server in servers.items() if server.ended_well}
 
     def other(self, file):
         poses = trajectory.moved(trajectory.read(file), self.T_body_cam)

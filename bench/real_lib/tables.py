@@ -1,5 +1,7 @@
 """The tables, as Markdown and as JSON."""
 
+from real_lib.funnel import table
+
 HEAD = ["| | ATE m, own scale | of the path | scale | scale of each piece | drift of scale | coverage | clock ms | "
         "revisits: pairs, error | maps |", "|---|---|---|---|---|---|---|---|---|---|"]
 CONSTRAINTS_HEAD = ["| | accepted | of revisits | refused | switched off | checked | wrong | median error | most frequent refusals |",
@@ -47,6 +49,7 @@ class Tables:
             self.rows[name] = results.other(file)
         self.spreads = {kind: spread([r for name, r in self.rows.items() if name.startswith(kind)]) for kind in ("odometry", "with server")}
         self.name = plan.source.name
+        self.funnels = results.funnels()
 
     def text(self):
         served = {name: r for name, r in self.rows.items() if r and "constraints" in r}
@@ -54,7 +57,8 @@ class Tables:
         lines += [f"Spread of scale between starts, {kind}: {value:.3f}." for kind, value in self.spreads.items() if value]
         lines += ["", *CONSTRAINTS_HEAD, *(constraints_row(name, r["constraints"]) for name, r in served.items()), ""]
         lines += [f"{name}: {'fused' if r['fused'] else 'not fused'}." for name, r in served.items() if name.startswith("halves")]
+        lines += ["", table(self.funnels)] if self.funnels else []
         return "\n".join(lines) + "\n"
 
     def json(self):
-        return {"recording": self.name, "rows": self.rows, "scale_spread": self.spreads}
+        return {"recording": self.name, "rows": self.rows, "scale_spread": self.spreads, "funnels": self.funnels}

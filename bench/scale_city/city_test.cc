@@ -41,7 +41,8 @@ TEST_F(CityTest, PlaceIsLikeNothingElse) {
       int alike = 0;
       for (const Corner& corner : keyframe.corners) {
         alike += std::ranges::any_of(other.corners, [&](const Corner& rival) {
-          return HammingDistance(corner.descriptor, rival.descriptor) <= kSureHamming;
+          return HammingDistance(corner.descriptor, rival.descriptor) <=
+                 LimitsOf(DescriptorKind::kOrb).sure;
         });
       }
       EXPECT_LT(alike, 0.02 * static_cast<double>(keyframe.corners.size())) << hall;

@@ -75,6 +75,7 @@ struct Keyframe {
   Eigen::Matrix2d roll_pitch_covariance = Eigen::Matrix2d::Identity() * 1e-4;
   std::optional<OdometryEdge> edge;              // none in a map's first keyframe, or after a gap
   std::optional<Preintegration> preintegration;  // from keyframe edge->from_seq to this one
+  DescriptorKind descriptor_kind = DescriptorKind::kOrb;
   std::vector<Corner> corners;
   std::vector<MapPoint> points;
   int64_t group_revision = 0;  // of the newest correction that the agent had applied; 0: none

@@ -34,6 +34,7 @@ void VisitHead(KeyframeType& k, const Visit& visit) {
   visit(&k.roll_pitch_covariance);
   visit(&k.group_revision);
   visit(&k.scale_sigma);
+  visit(&k.descriptor_kind);
   visit(&k.T_body_cam_covariance);
 }
 

@@ -16,8 +16,8 @@
 namespace pangea {
 
 struct MatchingOptions {
-  int max_distance = kAlikeHamming;  // bits
-  double max_ratio = 0.8;            // best distance / second best; 1 switches the test off
+  int max_distance = LimitsOf(DescriptorKind::kOrb).alike;  // bits
+  double max_ratio = 0.8;  // best distance / second best; 1 switches the test off
 };
 
 struct CornerMatch {

@@ -94,7 +94,9 @@ Keyframe KeyframeMaker::Make(const cv::Mat& image, const vio::TrackedFrame& fram
         R_from_odom * sigmas_odom.cwiseAbs2().asDiagonal() * R_from_odom.transpose();
     keyframe.edge = edge;
   }
-  keyframe.corners = describer_.Describe(image, frame);
+  keyframe.descriptor_kind = describer_.kind();
+  keyframe.corners = describer_.Describe(
+      image, frame, -(keyframe.T_odom_cam().q.conjugate() * Eigen::Vector3d::UnitZ()));
   for (size_t i = 0; i < keyframe.corners.size(); ++i) {
     const auto point = Triangulate(static_cast<int>(i), keyframe.corners[i], keyframe.T_odom_cam());
     if (point) {

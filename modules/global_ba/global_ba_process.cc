@@ -12,7 +12,7 @@
 namespace pangea {
 namespace {
 
-constexpr uint32_t kCheckpointFormat = 2;
+constexpr uint32_t kCheckpointFormat = 3;
 constexpr int64_t kSecond = 1'000'000;
 // Longer than the time after which the pose graph solves everything from the beginning.
 constexpr int64_t kQuiet_us = 3 * kSecond;

@@ -15,7 +15,7 @@
 namespace pangea {
 namespace {
 
-constexpr uint32_t kCheckpointFormat = 4;
+constexpr uint32_t kCheckpointFormat = 5;
 constexpr char kJournalOwner[] = "agent_handler";
 
 }  // namespace

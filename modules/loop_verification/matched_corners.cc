@@ -204,7 +204,7 @@ class Triangulation {
     const Descriptor& descriptor = host_.keyframe().corners[host_corner].descriptor;
     const NearestCorner nearest = FindNearest(
         corners, near, [&](int i) { return HammingDistance(corners[i].descriptor, descriptor); },
-        kAlikeHamming, kOtherCorner_px);
+        LimitsOf(host_.keyframe().descriptor_kind).alike, kOtherCorner_px);
     if (nearest.index < 0 || !nearest.PassesRatio(kMaxNeighbourRatio)) {
       return std::nullopt;
     }

@@ -54,7 +54,8 @@ std::optional<MapPoints::Outlook> MapPoints::OutlookOf(const AgentPose& agent,
   Rigid3 T_map_body = agent.T_map_body;
   T_map_body.t += kAhead_s * agent.v_map_body;
   const CameraModel& camera = view->keyframe().camera;
-  return Outlook{camera, T_map_body * camera.T_body_cam, newest->first.seq};
+  return Outlook{camera, T_map_body * camera.T_body_cam, newest->first.seq,
+                 view->keyframe().descriptor_kind};
 }
 
 // Selects the keyframe's points that the agent will see from a direction and distance similar to
@@ -131,7 +132,7 @@ std::vector<MapPoints::Source> MapPoints::SourcesFor(const AgentPose& agent,
   std::vector<Source> sources;
   for (const KeyframeId& id : Near(agent, group, outlook)) {
     const auto view = store_.Find(id);
-    if (view == nullptr) {
+    if (view == nullptr || view->keyframe().descriptor_kind != outlook.descriptor_kind) {
       continue;
     }
     const Rigid3 T_map_cam = group.T_map_body.at(id) * view->keyframe().camera.T_body_cam;

@@ -77,6 +77,7 @@ class MapPoints {
     CameraModel camera;
     Rigid3 T_map_cam;
     int32_t newest_seq = 0;
+    DescriptorKind descriptor_kind = DescriptorKind::kOrb;
   };
   struct Source {
     KeyframeId id;

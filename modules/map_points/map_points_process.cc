@@ -14,7 +14,7 @@
 namespace pangea {
 namespace {
 
-constexpr uint32_t kCheckpointFormat = 2;
+constexpr uint32_t kCheckpointFormat = 3;
 
 }  // namespace
 

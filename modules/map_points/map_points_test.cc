@@ -112,6 +112,17 @@ TEST_F(MapPointsTest, TellsWhatTheAgentWillSee) {
   EXPECT_LE(ToMessage(*message).getEncodedSize(), 1200);
 }
 
+TEST_F(MapPointsTest, SendsNoDescriptorsOfAKindThatTheAgentDoesNotCompute) {
+  for (Keyframe& keyframe : keyframes_) {
+    if (keyframe.id.map == kAgent) {
+      keyframe.descriptor_kind = DescriptorKind::kPatchNetwork;
+    }
+  }
+  MapPoints points = Filled();
+  points.TakeRefined(state_);
+  EXPECT_FALSE(points.Choose(PoseAt(0)));
+}
+
 class CountingStore : public RecordStore {
  public:
   std::optional<int64_t> Append(std::span<const uint8_t> record) override {

@@ -6,11 +6,12 @@
 
 #include "core/big_endian.h"
 #include "pangea/keyframe_2_t.hpp"
+#include "pangea/keyframe_3_t.hpp"
 
 namespace pangea {
 namespace {
 
-keyframe_2_t Whole(const KeyframeMessage& message) {
+keyframe_2_t WithErrors(const KeyframeMessage& message) {
   keyframe_2_t whole{};
   whole.keyframe = message;
   whole.scale_sigma = message.scale_sigma;
@@ -19,41 +20,65 @@ keyframe_2_t Whole(const KeyframeMessage& message) {
   return whole;
 }
 
+keyframe_3_t WithKind(const KeyframeMessage& message) {
+  keyframe_3_t whole{};
+  whole.keyframe = WithErrors(message);
+  whole.descriptor_kind = message.descriptor_kind;
+  return whole;
+}
+
+bool HasErrors(const KeyframeMessage& message) {
+  return message.scale_sigma != 0 || std::any_of(std::begin(message.T_body_cam_covariance),
+                                                 std::end(message.T_body_cam_covariance),
+                                                 [](double value) { return value != 0; });
+}
+
+void Take(keyframe_2_t whole, KeyframeMessage* message) {
+  static_cast<keyframe_t&>(*message) = std::move(whole.keyframe);
+  message->scale_sigma = whole.scale_sigma;
+  std::copy(std::begin(whole.T_body_cam_covariance), std::end(whole.T_body_cam_covariance),
+            message->T_body_cam_covariance);
+}
+
 }  // namespace
 
 bool KeyframeMessage::BeginsOne(const uint8_t* begin) {
   const uint64_t fingerprint = GetBigEndian(begin, sizeof(int64_t));
   return fingerprint == static_cast<uint64_t>(keyframe_t::getHash()) ||
-         fingerprint == static_cast<uint64_t>(keyframe_2_t::getHash());
+         fingerprint == static_cast<uint64_t>(keyframe_2_t::getHash()) ||
+         fingerprint == static_cast<uint64_t>(keyframe_3_t::getHash());
 }
 
-bool KeyframeMessage::SaysMore() const {
-  return scale_sigma != 0 ||
-         std::any_of(std::begin(T_body_cam_covariance), std::end(T_body_cam_covariance),
-                     [](double value) { return value != 0; });
+template <typename Use>
+int KeyframeMessage::WithType(Use use) const {
+  if (descriptor_kind != 0) {
+    return use(WithKind(*this));
+  }
+  return HasErrors(*this) ? use(WithErrors(*this)) : use(static_cast<const keyframe_t&>(*this));
 }
 
 int KeyframeMessage::encode(void* buf, int offset, int maxlen) const {
-  return SaysMore() ? Whole(*this).encode(buf, offset, maxlen)
-                    : keyframe_t::encode(buf, offset, maxlen);
+  return WithType([&](const auto& type) { return type.encode(buf, offset, maxlen); });
 }
 
 int KeyframeMessage::getEncodedSize() const {
-  return SaysMore() ? Whole(*this).getEncodedSize() : keyframe_t::getEncodedSize();
+  return WithType([](const auto& type) { return type.getEncodedSize(); });
 }
 
 int KeyframeMessage::decode(const void* buf, int offset, int maxlen) {
   *this = {};
-  keyframe_2_t whole{};
-  const int size = whole.decode(buf, offset, maxlen);
-  if (size < 0) {
-    return keyframe_t::decode(buf, offset, maxlen);
+  keyframe_3_t newest{};
+  if (const int size = newest.decode(buf, offset, maxlen); size >= 0) {
+    descriptor_kind = newest.descriptor_kind;
+    Take(std::move(newest.keyframe), this);
+    return size;
   }
-  keyframe_t::operator=(std::move(whole.keyframe));
-  scale_sigma = whole.scale_sigma;
-  std::copy(std::begin(whole.T_body_cam_covariance), std::end(whole.T_body_cam_covariance),
-            T_body_cam_covariance);
-  return size;
+  keyframe_2_t whole{};
+  if (const int size = whole.decode(buf, offset, maxlen); size >= 0) {
+    Take(std::move(whole), this);
+    return size;
+  }
+  return keyframe_t::decode(buf, offset, maxlen);
 }
 
 }  // namespace pangea

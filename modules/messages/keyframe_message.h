@@ -1,8 +1,8 @@
 #pragma once
 
-// The two message types of KEYFRAME_k as one: keyframe_t, and keyframe_2_t, which has more fields.
-// Decodes both. Encodes keyframe_t unless one of the additional fields is set, so that keyframes
-// without them keep the bytes of earlier versions.
+// The three message types of KEYFRAME_k as one: keyframe_t; keyframe_2_t and keyframe_3_t, which
+// have more fields. Decodes all. Encodes the first one that has all fields which are set, so that
+// keyframes without the additional ones keep the bytes of earlier versions.
 
 #include <cstdint>
 
@@ -15,8 +15,10 @@ struct KeyframeMessage : keyframe_t {
   // The additional fields of keyframe_2_t.
   double scale_sigma = 0;
   double T_body_cam_covariance[36] = {};
+  // The additional field of keyframe_3_t.
+  int8_t descriptor_kind = 0;
 
-  // Whether the eight bytes from `begin` on are the fingerprint of one of the two types.
+  // Whether the eight bytes from `begin` on are the fingerprint of one of the types.
   static bool BeginsOne(const uint8_t* begin);
 
   int encode(void* buf, int offset, int maxlen) const;
@@ -24,7 +26,9 @@ struct KeyframeMessage : keyframe_t {
   int getEncodedSize() const;
 
  private:
-  bool SaysMore() const;
+  // Calls use(message of the type that is encoded).
+  template <typename Use>
+  int WithType(Use use) const;
 };
 
 }  // namespace pangea

@@ -85,13 +85,18 @@ void PackCorners(const Keyframe& keyframe, keyframe_t* m) {
 }
 
 // Returns why the corners are refused, or an empty string.
-std::string UnpackCorners(const keyframe_t& m, Keyframe* keyframe) {
+std::string UnpackCorners(const KeyframeMessage& m, Keyframe* keyframe) {
   if (m.num_corners < 0 || m.num_corners > kMaxCorners) {
     return fmt::format("num_corners {} out of 0 to {}", m.num_corners, kMaxCorners);
   }
   if (m.num_descriptor_bytes != m.num_corners * static_cast<int>(sizeof(Descriptor))) {
     return "descriptor bytes do not match the corners";
   }
+  if (m.descriptor_kind < 0 || m.descriptor_kind >= kNumDescriptorKinds) {
+    return fmt::format("descriptor_kind {} is unknown to this version, which knows 0 to {}",
+                       m.descriptor_kind, kNumDescriptorKinds - 1);
+  }
+  keyframe->descriptor_kind = static_cast<DescriptorKind>(m.descriptor_kind);
   keyframe->corners.resize(m.num_corners);
   for (int i = 0; i < m.num_corners; ++i) {
     Corner& corner = keyframe->corners[i];
@@ -115,7 +120,7 @@ std::string UnpackCorners(const keyframe_t& m, Keyframe* keyframe) {
   return "";
 }
 
-std::string UnpackPoints(const keyframe_t& m, Keyframe* keyframe) {
+std::string UnpackPoints(const KeyframeMessage& m, Keyframe* keyframe) {
   if (m.num_points < 0 || m.num_points > m.num_corners) {
     return "more points than corners";
   }
@@ -133,7 +138,7 @@ std::string UnpackPoints(const keyframe_t& m, Keyframe* keyframe) {
   return "";
 }
 
-std::string UnpackEdge(const keyframe_t& m, Keyframe* keyframe) {
+std::string UnpackEdge(const KeyframeMessage& m, Keyframe* keyframe) {
   if (m.has_edge) {
     const auto T = pangea::Parse(m.T_from_this);
     const auto covariance = ToCovariance<6>(m.edge_covariance);
@@ -200,6 +205,7 @@ KeyframeMessage ToMessage(const Keyframe& keyframe) {
   m.num_points = static_cast<int16_t>(keyframe.points.size());
   m.group_revision = keyframe.group_revision;
   m.scale_sigma = keyframe.scale_sigma;
+  m.descriptor_kind = static_cast<int8_t>(keyframe.descriptor_kind);
   FromMatrix(keyframe.T_body_cam_covariance, m.T_body_cam_covariance);
   return m;
 }

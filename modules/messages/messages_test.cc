@@ -104,6 +104,30 @@ TEST(Messages, AKeyframeSaysHowSureItsScaleAndExtrinsicsAre) {
   EXPECT_EQ(out.value->corners.size(), in.corners.size());
 }
 
+// ORB's keyframes keep the older types.
+TEST(Messages, AKeyframeSaysOfWhichKindItsDescriptorsAre) {
+  Keyframe in = RandomKeyframe(1);
+  in.scale_sigma = 0.07;
+  const size_t with_errors = EncodeMessage(ToMessage(in)).size();
+  in.descriptor_kind = DescriptorKind::kPatchNetwork;
+  EXPECT_EQ(EncodeMessage(ToMessage(in)).size(), with_errors + 1);
+  const auto out = Parse(ThroughBytes(ToMessage(in)));
+  ASSERT_TRUE(out.value) << out.refused;
+  EXPECT_EQ(out.value->descriptor_kind, DescriptorKind::kPatchNetwork);
+  EXPECT_EQ(out.value->scale_sigma, 0.07);
+  EXPECT_EQ(out.value->corners.size(), in.corners.size());
+}
+
+TEST(Messages, AKindOfDescriptorsThatNobodyKnowsIsNamed) {
+  KeyframeMessage message = ToMessage(RandomKeyframe(1));
+  for (const int kind : {-1, kNumDescriptorKinds, 100}) {
+    message.descriptor_kind = static_cast<int8_t>(kind);
+    const auto out = Parse(ThroughBytes(message));
+    EXPECT_FALSE(out.value);
+    EXPECT_NE(out.refused.find("descriptor_kind"), std::string::npos) << out.refused;
+  }
+}
+
 // A keyframe with 600 corners, of which 120 are tracked, and 70 points.
 TEST(Messages, KeyframeFitsItsBudget) {
   EXPECT_LE(ToMessage(RandomKeyframe(2)).getEncodedSize(), 28'000);

@@ -18,14 +18,17 @@ struct CornersAndRays {
 };
 
 // Near the epipolar line there are far fewer rivals, so the ratio test is looser.
-inline constexpr MatchingOptions kGuidedMatching{.max_distance = kAlikeHamming, .max_ratio = 0.9};
+inline MatchingOptions GuidedMatching(DescriptorKind kind) {
+  return {.max_distance = LimitsOf(kind).alike, .max_ratio = 0.9};
+}
 
 // Returns mutual nearest neighbours, as (corner of a, corner of b) in the order of a, among the
 // pairs with a residual up to kMaxEpipolarResidual; `model` maps a to b. `pairs`: all pairs with a
-// descriptor distance up to RivalDistance(kGuidedMatching) or more (see PairsWithin).
+// descriptor distance up to RivalDistance(matching) or more (see PairsWithin).
 std::vector<std::pair<int, int>> MatchAlongEpipolarLines(std::vector<CornerMatch> pairs,
                                                          const CornersAndRays& a,
                                                          const CornersAndRays& b,
-                                                         const EpipolarModel& model);
+                                                         const EpipolarModel& model,
+                                                         const MatchingOptions& matching);
 
 }  // namespace pangea

@@ -32,7 +32,7 @@ PlaceMatch PlaceRecognition::Add(const Keyframe& keyframe, std::vector<PlaceRepo
   std::vector<Place> own;
   std::vector<Place> others;
   for (int i = 0; i < static_cast<int>(scores.size()); ++i) {
-    if (scores[i] <= 0) {
+    if (scores[i] <= 0 || stored_.descriptor_kind(i) != query.descriptor_kind) {
       continue;
     }
     if (stored_.id(i).map != query.id.map) {
@@ -245,7 +245,8 @@ std::optional<PlaceCandidate> PlaceRecognition::Verify(const RecognisedKeyframe&
     return std::nullopt;
   }
   const RecognisedKeyframe& other = *stored;
-  TwoViewResult views = CheckTwoViews(query, other, RivalDistance(kGuidedMatching));
+  const MatchingOptions guided = GuidedMatching(query.descriptor_kind);
+  TwoViewResult views = CheckTwoViews(query, other, RivalDistance(guided));
   if (!views.epipolar) {
     ++counters_.rejected_matching;
     match->rejected.push_back(
@@ -268,7 +269,7 @@ std::optional<PlaceCandidate> PlaceRecognition::Verify(const RecognisedKeyframe&
   candidate.score = place.score;
   candidate.corner_matches =
       MatchAlongEpipolarLines(std::move(views.pairs), {query.corners, query.rays},
-                              {other.corners, other.rays}, epipolar.model);
+                              {other.corners, other.rays}, epipolar.model, guided);
   return candidate;
 }
 

@@ -73,6 +73,22 @@ TEST(PlaceRecognition, FindsTheSecondRoundOfItsOwnMapAndNothingInTheFirst) {
   EXPECT_EQ(found, 50);
 }
 
+// The world gives both kinds the same bits; real ones would not be alike.
+TEST(PlaceRecognition, ComparesNoDescriptorsOfDifferentKinds) {
+  test::TestWorld world(2);
+  PlaceRecognition recognition({});
+  for (int seq = 0; seq < 20; ++seq) {
+    recognition.Add(OnTheRound(world, kMapA, seq, {}));
+  }
+  Keyframe other = OnTheRound(world, kMapB, 0, kOdomB, 10);
+  other.descriptor_kind = DescriptorKind::kPatchNetwork;
+  std::vector<PlaceReport> checked;
+  EXPECT_TRUE(recognition.Add(other, &checked).candidates.empty());
+  EXPECT_TRUE(checked.empty());
+  other.id.map.agent_id = 7;
+  EXPECT_FALSE(recognition.Add(other).candidates.empty());
+}
+
 TEST(PlaceRecognition, FindsTheOtherMapWhateverItsOdomFrame) {
   test::TestWorld world(2);
   PlaceRecognition recognition({});

@@ -30,7 +30,7 @@ std::vector<uint8_t> ToRecord(const RecognisedKeyframe& keyframe) {
 }  // namespace
 
 RecognisedKeyframe::RecognisedKeyframe(const Keyframe& keyframe)
-    : id(keyframe.id), corners(keyframe.corners) {
+    : id(keyframe.id), descriptor_kind(keyframe.descriptor_kind), corners(keyframe.corners) {
   const Eigen::Quaterniond q_odom_cam = keyframe.T_odom_cam().q;
   rays.reserve(corners.size());
   for (const Corner& corner : corners) {
@@ -137,7 +137,8 @@ bool StoredKeyframes::Add(const RecognisedKeyframe& keyframe) {
     }
     ++counters_.in_memory;
   }
-  keyframes_.push_back({keyframe.id, AscendingNumbers(keyframe.landmarks), std::move(corners)});
+  keyframes_.push_back({keyframe.id, keyframe.descriptor_kind, AscendingNumbers(keyframe.landmarks),
+                        std::move(corners)});
   return true;
 }
 
@@ -145,6 +146,7 @@ void StoredKeyframes::Save(ByteWriter* writer) const {
   writer->PutCount(keyframes_.size());
   for (const Stored& keyframe : keyframes_) {
     writer->Put(keyframe.id);
+    writer->Put(keyframe.descriptor_kind);
     keyframe.landmarks.Save(writer);
     writer->Put(keyframe.corners.offset());
     writer->Put(keyframe.corners.size());
@@ -152,22 +154,24 @@ void StoredKeyframes::Save(ByteWriter* writer) const {
 }
 
 bool StoredKeyframes::Restore(ByteReader* reader) {
-  constexpr size_t kMinBytes = 32;
+  constexpr size_t kMinBytes = 33;
   constexpr size_t kMaxRecordBytes = RecordBytes(kMaxCorners);
   std::deque<Stored> keyframes;
   for (size_t left = reader->GetCount(kMinBytes); left > 0; --left) {
     KeyframeId id;
+    auto kind = DescriptorKind::kOrb;
     AscendingNumbers landmarks;
     int64_t offset = 0;
     uint32_t size = 0;
     reader->Get(&id);
+    reader->Get(&kind);
     const bool has_landmarks = landmarks.Restore(reader);
     reader->Get(&offset);
     reader->Get(&size);
     if (!has_landmarks || id.seq < 0 || offset < 0 || size > kMaxRecordBytes) {
       return false;
     }
-    keyframes.push_back({id, std::move(landmarks), Record(offset, size)});
+    keyframes.push_back({id, kind, std::move(landmarks), Record(offset, size)});
   }
   keyframes_ = std::move(keyframes);
   return reader->ok();
@@ -190,6 +194,7 @@ std::shared_ptr<const RecognisedKeyframe> StoredKeyframes::Find(int number) {
   ByteRecordReader reader(*record);
   RecognisedKeyframe keyframe;
   keyframe.id = stored.id;
+  keyframe.descriptor_kind = stored.descriptor_kind;
   GetCorners(&reader, &keyframe.corners);
   keyframe.rays.resize(reader.GetCount(kRayBytes));
   for (CornerRay& ray : keyframe.rays) {

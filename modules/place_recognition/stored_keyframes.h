@@ -23,6 +23,7 @@ struct RecognisedKeyframe {
   explicit RecognisedKeyframe(const Keyframe& keyframe);
 
   KeyframeId id;
+  DescriptorKind descriptor_kind = DescriptorKind::kOrb;
   std::vector<Corner> corners;
   std::vector<CornerRay> rays;     // zero direction and sigma if the pixel cannot be undistorted
   std::vector<int32_t> landmarks;  // ascending
@@ -73,6 +74,7 @@ class StoredKeyframes {
 
   const std::shared_ptr<RecordStore>& records() const { return records_; }
   const KeyframeId& id(int number) const { return keyframes_[number].id; }
+  DescriptorKind descriptor_kind(int number) const { return keyframes_[number].descriptor_kind; }
   bool SharesLandmark(int number, const RecognisedKeyframe& other) const;
   // Null if the record cannot be read. `landmarks` of the result is empty.
   std::shared_ptr<const RecognisedKeyframe> Find(int number);
@@ -85,6 +87,7 @@ class StoredKeyframes {
 
   struct Stored {
     KeyframeId id;
+    DescriptorKind descriptor_kind;
     AscendingNumbers landmarks;
     Record corners;
   };

@@ -8,7 +8,9 @@ namespace pangea {
 namespace {
 
 // Looser than usual: the epipolar check tolerates wrong matches and measures their probability.
-constexpr MatchingOptions kMatching{.max_distance = kCandidateHamming, .max_ratio = 0.85};
+MatchingOptions Matching(DescriptorKind kind) {
+  return {.max_distance = LimitsOf(kind).candidate, .max_ratio = 0.85};
+}
 constexpr uint64_t kSeedSalt = 0x706c616365;  // "place"
 
 std::vector<std::pair<CornerRay, CornerRay>> RayPairs(const std::vector<CornerRay>& a,
@@ -26,10 +28,11 @@ std::vector<std::pair<CornerRay, CornerRay>> RayPairs(const std::vector<CornerRa
 
 TwoViewResult CheckTwoViews(const RecognisedKeyframe& query, const RecognisedKeyframe& other,
                             int pairs_up_to) {
+  const MatchingOptions matching = Matching(query.descriptor_kind);
   TwoViewResult result;
   result.pairs =
-      PairsWithin(query.corners, other.corners, std::max(pairs_up_to, RivalDistance(kMatching)));
-  std::vector<CornerMatch> matches = MutualNearest(result.pairs, other.corners, kMatching);
+      PairsWithin(query.corners, other.corners, std::max(pairs_up_to, RivalDistance(matching)));
+  std::vector<CornerMatch> matches = MutualNearest(result.pairs, other.corners, matching);
   std::erase_if(matches, [&](const CornerMatch& m) {
     return query.rays[m.a].sigma <= 0 || other.rays[m.b].sigma <= 0;
   });

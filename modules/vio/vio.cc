@@ -172,6 +172,19 @@ VioOutput Vio::AddTracks(const TrackedFrame& frame, const cv::Mat& image,
   return Estimate(frame, image, imu);
 }
 
+// Before there is a pose, gravity is taken from the accelerometer: it measures upwards.
+Eigen::Vector3d Vio::DownInCamera(const FrameResult& result, std::span<const ImuSample> imu) const {
+  Eigen::Vector3d down_body = Eigen::Vector3d::Zero();
+  if (result.state == EstimatorState::kTracking) {
+    down_body = result.T_odom_body.q.conjugate() * -Eigen::Vector3d::UnitZ();
+  } else {
+    for (const ImuSample& sample : imu) {
+      down_body -= sample.accel;
+    }
+  }
+  return camera_.T_body_cam.q.conjugate() * down_body;
+}
+
 VioOutput Vio::Estimate(const TrackedFrame& frame, const cv::Mat& image,
                         std::span<const ImuSample> imu) {
   FrameResult result = estimator_->AddFrame(frame, imu);
@@ -199,7 +212,7 @@ VioOutput Vio::Estimate(const TrackedFrame& frame, const cv::Mat& image,
     return output;
   }
   if (result.is_keyframe) {
-    described_[frame.utime] = describer_.Describe(image, frame);
+    described_[frame.utime] = describer_.Describe(image, frame, DownInCamera(result, imu));
   }
   if (result.state == EstimatorState::kTracking) {
     map_has_poses_ = true;
@@ -214,7 +227,7 @@ Vio::View Vio::NewestKeyframe(const VioOutput& output) const {
   keyframe.camera = estimator_->camera();
   keyframe.corners = described_.at(output.utime);
   CompensateRollingShutter(output.motion, keyframe);
-  return {keyframe.camera, std::move(keyframe.corners), estimator_->Poses()};
+  return {keyframe.camera, std::move(keyframe.corners), describer_.kind(), estimator_->Poses()};
 }
 
 void Vio::NoteCorrection(const MapId& map, int64_t revision) {
@@ -256,6 +269,7 @@ Keyframe Vio::Complete(const FinishedKeyframe& finished) {
                                  finished.edge->covariance};
   }
   keyframe.preintegration = finished.preintegration;
+  keyframe.descriptor_kind = describer_.kind();
   if (auto node = described_.extract(finished.utime)) {
     keyframe.corners = std::move(node.mapped());
   }

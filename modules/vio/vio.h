@@ -88,6 +88,7 @@ class Vio {
   struct View {
     CameraModel camera;
     std::vector<Corner> corners;  // as a global shutter would see them
+    DescriptorKind descriptor_kind = DescriptorKind::kOrb;
     WindowPoses window;
   };
   // `output`: the result of AddImage or AddTracks for that image. Changes no state.
@@ -109,6 +110,7 @@ class Vio {
   VioOutput AddNewImage(int64_t utime, const cv::Mat& image);
   VioOutput ChangeStamps();
   VioOutput Hold(const TrackedFrame& frame, const cv::Mat& image);
+  Eigen::Vector3d DownInCamera(const FrameResult& result, std::span<const ImuSample> imu) const;
   VioOutput Estimate(const TrackedFrame& frame, const cv::Mat& image,
                      std::span<const ImuSample> imu);
   std::vector<Keyframe> Complete(const std::vector<FinishedKeyframe>& finished);

@@ -179,7 +179,7 @@ void VioProcess::Localise(const VioOutput& output) {
     return;
   }
   const Vio::View view = vio_->NewestKeyframe(output);
-  localization_.AddKeyframe(view.camera, view.corners, view.window);
+  localization_.AddKeyframe(view.camera, view.corners, view.descriptor_kind, view.window);
   shown_.Sharpen(*localization_.T_map_odom());
   const MapLocalisation::Counters& counters = localization_.counters();
   node_.Set("keyframes_localised", counters.localised);

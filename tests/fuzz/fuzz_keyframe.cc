@@ -1,15 +1,19 @@
 // A keyframe, from bytes to the domain type.
 
+#include <array>
+
 #include "fuzz.h"
 #include "messages/encoding.h"
 #include "messages/messages.h"
 #include "pangea/keyframe_2_t.hpp"
+#include "pangea/keyframe_3_t.hpp"
 
 static int FuzzKeyframe(const uint8_t* data, size_t size) {
   using namespace pangea;
   std::vector<uint8_t> bytes(data, data + size);
-  const bool second = size > 0 && data[size - 1] % 2 == 1;
-  fuzz::SetFingerprint(second ? keyframe_2_t::getHash() : keyframe_t::getHash(), &bytes);
+  const std::array<int64_t, 3> types = {keyframe_t::getHash(), keyframe_2_t::getHash(),
+                                        keyframe_3_t::getHash()};
+  fuzz::SetFingerprint(types[size > 0 ? data[size - 1] % types.size() : 0], &bytes);
   KeyframeMessage message{};
   if (!DecodeMessage(bytes, &message)) {
     return 0;

@@ -16,6 +16,7 @@
 #include "messages/messages.h"
 #include "pangea/have_t.hpp"
 #include "pangea/keyframe_2_t.hpp"
+#include "pangea/keyframe_3_t.hpp"
 
 namespace pangea {
 namespace {
@@ -166,7 +167,8 @@ bool Archive::LoadEvent(const std::string& channel, Bytes data, const JournalPla
       return true;
     }
     node_.Count("journal_events_unreadable");
-    return !IsDamaged<keyframe_t>(data) && !IsDamaged<keyframe_2_t>(data);
+    return !IsDamaged<keyframe_t>(data) && !IsDamaged<keyframe_2_t>(data) &&
+           !IsDamaged<keyframe_3_t>(data);
   }
   if (channel == channels::kPlaceMatch) {
     return LoadAnswer<place_match_t>(data, place);

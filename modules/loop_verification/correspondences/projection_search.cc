@@ -100,7 +100,7 @@ class ProjectionSearch {
       return LandmarkDistance(holder_, landmark, view_.keyframe().corners[i].descriptor);
     };
     return FindNearest(view_.keyframe().corners, CornersWithin(landmark, prediction), distance_of,
-                       kPredictedHamming, kSamePx);
+                       LimitsOf(view_.keyframe().descriptor_kind).predicted, kSamePx);
   }
 
  private:

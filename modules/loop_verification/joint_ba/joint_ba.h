@@ -29,10 +29,12 @@ struct JointBaOptions {
   // blur, correlated depth errors of one odometry. It adds a rotation of this many pixels, and the
   // translation with the same effect at the median distance of the points.
   double systematic_px = 0.2;
-  double max_chi2 = 9.2;            // of an inlier: 99 %, 2 degrees of freedom
-  double max_depth_chi2 = 10.8;     // of a depth against its prior: 99.9 %, 1 degree of freedom
-  int sure_hamming = kSureHamming;  // a landmark is sure if a match has at most this distance
-  int iterations = 8;               // in each of the two rounds
+  double max_chi2 = 9.2;         // of an inlier: 99 %, 2 degrees of freedom
+  double max_depth_chi2 = 10.8;  // of a depth against its prior: 99.9 %, 1 degree of freedom
+  // A landmark is sure if a match has at most this distance. Of ORB; the limit of another kind of
+  // descriptors is as much larger as LimitsOf says.
+  int sure_hamming = LimitsOf(DescriptorKind::kOrb).sure;
+  int iterations = 8;  // in each of the two rounds
 
   template <typename Archive>
   void Visit(Archive& archive) {
@@ -43,7 +45,7 @@ struct JointBaOptions {
     archive.Add("max_depth_chi2", &max_depth_chi2, {0.1, 1000}, "",
                 "of a point's depth against its prior, 1 degree of freedom");
     archive.Add("sure_hamming", &sure_hamming, {0, kDescriptorBits}, "bits",
-                "a landmark with one match as near is sure");
+                "of ORB: a landmark with one match as near is sure");
     archive.Add("iterations", &iterations, {1, 1000}, "", "of each of the two rounds");
   }
 };

@@ -307,6 +307,9 @@ std::vector<JoinedPoints> JointProblem::Landmarks(const std::vector<PointMatch>&
     }
     return point;
   };
+  const DescriptorKind kind = windows_[0]->newest_keyframe().descriptor_kind;
+  const int sure_hamming =
+      options_.sure_hamming + LimitsOf(kind).sure - LimitsOf(DescriptorKind::kOrb).sure;
   std::vector<bool> sure(points_.size(), false);
   for (size_t i = 0; i < matches.size(); ++i) {
     const int side = HolderSide(matches[i]);
@@ -314,7 +317,7 @@ std::vector<JoinedPoints> JointProblem::Landmarks(const std::vector<PointMatch>&
     if (!use[i] || own < 0) {
       continue;
     }
-    sure[own] = sure[own] || matches[i].distance <= options_.sure_hamming;
+    sure[own] = sure[own] || matches[i].distance <= sure_hamming;
     const int other = Other(matches[i]) < 0 ? -1 : index_[1 - side][Other(matches[i])];
     if (other >= 0) {
       leader[find(other)] = find(own);

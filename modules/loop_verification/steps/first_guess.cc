@@ -11,9 +11,10 @@ constexpr double kFirstMaxRatio = 0.85;  // best to second-best distance, withou
 
 std::vector<PointMatch> FirstMatches(const Verification& v) {
   std::vector<PointMatch> matches = CandidateMatches(v.windows, v.candidate);
+  const DescriptorKind kind = v.windows.m.newest_keyframe().descriptor_kind;
   for (const Direction direction : kBothDirections) {
     const std::vector<PointMatch> nearest =
-        MatchByDescriptor(v.windows, direction, kAlikeHamming, kFirstMaxRatio);
+        MatchByDescriptor(v.windows, direction, LimitsOf(kind).alike, kFirstMaxRatio);
     matches.insert(matches.end(), nearest.begin(), nearest.end());
   }
   return Distinct(matches);

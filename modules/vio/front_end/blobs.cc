@@ -19,7 +19,27 @@ int OctaveOf(double diameter_px) {
   return std::clamp(static_cast<int>(std::lround(octave)), 0, kMaxOctave);
 }
 
+Corner ToCorner(const Blob& blob) {
+  Corner corner;
+  corner.pixel = {blob.pixel.x, blob.pixel.y};
+  corner.octave = static_cast<int8_t>(OctaveOf(2 * blob.sigma_px));
+  return corner;
+}
+
 }  // namespace
+
+std::vector<FoundBlob> FindBlobs(const cv::Mat& image, int wanted, int cell_px) {
+  std::vector<FoundBlob> found;
+  if (wanted <= 0) {
+    return found;
+  }
+  const ScaleSpace space(image);
+  for (const Blob& blob :
+       SpreadOver(space.blobs(), &Blob::pixel, cell_px, image.cols, static_cast<size_t>(wanted))) {
+    found.push_back({ToCorner(blob), blob.sigma_px});
+  }
+  return found;
+}
 
 std::vector<Corner> DescribeBlobs(const cv::Mat& image, int wanted, int cell_px) {
   std::vector<Corner> corners;
@@ -30,9 +50,7 @@ std::vector<Corner> DescribeBlobs(const cv::Mat& image, int wanted, int cell_px)
   for (const Blob& blob :
        SpreadOver(space.blobs(), &Blob::pixel, cell_px, image.cols, static_cast<size_t>(wanted))) {
     for (const Descriptor& descriptor : DescribeBlob(space, blob)) {
-      Corner corner;
-      corner.pixel = {blob.pixel.x, blob.pixel.y};
-      corner.octave = static_cast<int8_t>(OctaveOf(2 * blob.sigma_px));
+      Corner corner = ToCorner(blob);
       corner.descriptor = descriptor;
       corners.push_back(corner);
     }

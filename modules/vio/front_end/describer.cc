@@ -9,6 +9,8 @@
 #include <utility>
 
 #include "vio/front_end/blobs.h"
+#include "vio/front_end/patch_network.h"
+#include "vio/front_end/patch_sampler.h"
 #include "vio/front_end/spread.h"
 
 namespace pangea::vio {
@@ -27,6 +29,12 @@ constexpr int kLowFastThreshold = 7;
 constexpr float kSnapRadius = 2.F;
 // Enough to match a keyframe with one 3.6 times as far away (kOctaveScale to the seventh).
 constexpr int kOctaves = 8;
+// Width of the pixels of the network's patch: of a corner, in pixels of its octave (two octaves
+// above, where it is smooth); of a blob, in sigmas.
+constexpr double kCornerStep = kOctaveScale * kOctaveScale;
+constexpr double kBlobStep = 0.5;
+constexpr int kPatchOctaves = 4;  // above those of the corners
+constexpr double kRounding = 1 + 1e-6;
 constexpr int kCell_px = 40;  // corners are spread over cells of this size, on each octave
 
 // Half width of each row of the disc. By the rounding, the disc is only nearly the same in both
@@ -50,6 +58,15 @@ void Alternate(std::span<const Corner> a, std::span<const Corner> b, std::vector
   }
 }
 
+std::vector<Corner> WithNetwork(std::vector<Corner> corners,
+                                const std::vector<PatchNetwork::Patch>& patches) {
+  const std::vector<Descriptor> descriptors = PatchNetwork::BuiltIn().Describe(patches);
+  for (size_t i = 0; i < corners.size(); ++i) {
+    corners[i].descriptor = descriptors[i];
+  }
+  return corners;
+}
+
 }  // namespace
 
 Describer::Describer(const CameraModel& camera, const DescriberOptions& options)
@@ -63,16 +80,16 @@ Describer::Describer(const CameraModel& camera, const DescriberOptions& options)
 }
 
 void Describer::BuildPyramid(const cv::Mat& image) {
-  pyramid_.resize(scales_.size());
+  pyramid_.resize(scales_.size() + kPatchOctaves);
   strong_.resize(scales_.size());
+  pyramid_[0] = image;
+  for (size_t octave = 1; octave < pyramid_.size(); ++octave) {
+    const double scale = std::pow(kOctaveScale, octave);
+    const cv::Size size(static_cast<int>(std::lround(image.cols / scale)),
+                        static_cast<int>(std::lround(image.rows / scale)));
+    cv::resize(pyramid_[octave - 1], pyramid_[octave], size, 0, 0, cv::INTER_LINEAR_EXACT);
+  }
   for (size_t octave = 0; octave < scales_.size(); ++octave) {
-    if (octave == 0) {
-      pyramid_[0] = image;
-    } else {
-      const cv::Size size(static_cast<int>(std::lround(image.cols / scales_[octave])),
-                          static_cast<int>(std::lround(image.rows / scales_[octave])));
-      cv::resize(pyramid_[octave - 1], pyramid_[octave], size, 0, 0, cv::INTER_LINEAR_EXACT);
-    }
     cv::FAST(pyramid_[octave], strong_[octave], kFastThreshold, true);
   }
 }
@@ -232,7 +249,62 @@ float Describer::Angle(int octave, const cv::Point2f& level_pixel) const {
   return cv::fastAtan2(static_cast<float>(m01), static_cast<float>(m10));
 }
 
-std::vector<Corner> Describer::Compute(const std::vector<Candidate>& candidates) const {
+Corner Describer::ToCorner(const Candidate& candidate) const {
+  Corner corner;
+  corner.octave = static_cast<int8_t>(candidate.octave);
+  corner.landmark_id = candidate.landmark_id;
+  corner.pixel = candidate.landmark_id != kNoLandmark
+                     ? candidate.pixel
+                     : ToImage(candidate.octave, candidate.level_pixel);
+  return corner;
+}
+
+// It is sampled from the coarsest octave that is not coarser than the patch.
+PatchNetwork::Patch Describer::PatchAt(const Eigen::Vector2f& pixel, double step_px,
+                                       const PatchSampler& sampler) const {
+  int octave = 0;
+  double scale = 1;
+  while (octave + 1 < static_cast<int>(pyramid_.size()) &&
+         scale * kOctaveScale <= step_px * kRounding) {
+    scale *= kOctaveScale;
+    ++octave;
+  }
+  const double step = std::max(step_px, 1.0) * pyramid_[octave].cols / pyramid_[0].cols;
+  return sampler.Sample(pyramid_[octave], ToLevel(octave, pixel), step);
+}
+
+std::vector<Corner> Describer::DescribeCorners(const std::vector<Candidate>& candidates,
+                                               const Eigen::Vector3d& down_cam) const {
+  if (options_.descriptor == DescriptorKind::kOrb) {
+    return ComputeOrb(candidates);
+  }
+  const PatchSampler sampler(down_cam);
+  std::vector<Corner> corners;
+  std::vector<PatchNetwork::Patch> patches;
+  for (const Candidate& candidate : candidates) {
+    corners.push_back(ToCorner(candidate));
+    patches.push_back(PatchAt(ToImage(candidate.octave, candidate.level_pixel),
+                              kCornerStep * scales_[candidate.octave], sampler));
+  }
+  return WithNetwork(std::move(corners), patches);
+}
+
+std::vector<Corner> Describer::DescribeBlobs(const cv::Mat& image, int wanted,
+                                             const Eigen::Vector3d& down_cam) const {
+  if (options_.descriptor == DescriptorKind::kOrb) {
+    return vio::DescribeBlobs(image, wanted, kCell_px);
+  }
+  const PatchSampler sampler(down_cam);
+  std::vector<Corner> corners;
+  std::vector<PatchNetwork::Patch> patches;
+  for (const FoundBlob& blob : FindBlobs(image, wanted, kCell_px)) {
+    corners.push_back(blob.corner);
+    patches.push_back(PatchAt(blob.corner.pixel, kBlobStep * blob.sigma_px, sampler));
+  }
+  return WithNetwork(std::move(corners), patches);
+}
+
+std::vector<Corner> Describer::ComputeOrb(const std::vector<Candidate>& candidates) const {
   std::vector<Corner> corners(candidates.size());
   std::vector<cv::KeyPoint> keypoints;
   for (size_t octave = 0; octave < scales_.size(); ++octave) {
@@ -252,11 +324,7 @@ std::vector<Corner> Describer::Compute(const std::vector<Candidate>& candidates)
     for (int row = 0; row < descriptors.rows; ++row) {
       const Candidate& candidate = candidates[static_cast<size_t>(keypoints[row].class_id)];
       Corner& corner = corners[static_cast<size_t>(keypoints[row].class_id)];
-      corner.octave = static_cast<int8_t>(octave);
-      corner.landmark_id = candidate.landmark_id;
-      corner.pixel = candidate.landmark_id != kNoLandmark
-                         ? candidate.pixel
-                         : ToImage(candidate.octave, candidate.level_pixel);
+      corner = ToCorner(candidate);
       std::memcpy(corner.descriptor.data(), descriptors.ptr(row), sizeof(Descriptor));
     }
   }
@@ -281,20 +349,21 @@ std::vector<Describer::Candidate> Describer::FindCorners(int wanted) const {
   return corners;
 }
 
-std::vector<Corner> Describer::Describe(const cv::Mat& image, const TrackedFrame& frame) {
+std::vector<Corner> Describer::Describe(const cv::Mat& image, const TrackedFrame& frame,
+                                        const Eigen::Vector3d& down_cam) {
   BuildPyramid(image);
   std::vector<Candidate> candidates = PlaceLandmarks(frame);
   candidates.resize(std::min(candidates.size(), size_t{kMaxCorners}));
   const auto num_landmarks = static_cast<std::ptrdiff_t>(candidates.size());
   const int left = kMaxCorners - static_cast<int>(num_landmarks);
   const std::vector<Corner> blobs =
-      DescribeBlobs(image, std::min(options_.max_blobs, left), kCell_px);
+      DescribeBlobs(image, std::min(options_.max_blobs, left), down_cam);
   const size_t num_others = static_cast<size_t>(left) - blobs.size();
   const std::vector<Candidate> others = FindCorners(static_cast<int>(num_others));
   candidates.insert(
       candidates.end(), others.begin(),
       others.begin() + static_cast<std::ptrdiff_t>(std::min(others.size(), num_others)));
-  const std::vector<Corner> described = Compute(candidates);
+  const std::vector<Corner> described = DescribeCorners(candidates, down_cam);
   std::vector<Corner> corners(described.begin(), described.begin() + num_landmarks);
   Alternate(std::span(described).subspan(static_cast<size_t>(num_landmarks)), blobs, &corners);
   return corners;

@@ -1,9 +1,11 @@
 #pragma once
 
 // Detects and describes the corners of a keyframe: its tracked landmarks, blobs (blobs.h), and FAST
-// corners spread over the image and a pyramid. Landmarks and FAST corners have OpenCV's ORB
-// descriptor (Rublee et al., ICCV 2011: 256 bits, orientation from the intensity centroid). Blobs
-// have a descriptor of their own, also 256 bits, which is not similar to any of a corner.
+// corners spread over the image and a pyramid. Landmarks and FAST corners have the descriptor of a
+// trained network (patch_network.h) of a patch turned upright by gravity, and so have blobs. Or,
+// for maps of earlier versions, corners have OpenCV's ORB (Rublee et al., ICCV 2011: 256 bits,
+// orientation from the intensity centroid) and blobs a descriptor of their own
+// (blob_descriptor.h), also 256 bits, which is not similar to any of a corner.
 //
 // Keyframes are matched across viewpoints and distances, so a tracked landmark is described on the
 // octaves on which it is a corner, not on the octave on which the tracker follows it.
@@ -16,15 +18,21 @@
 
 #include "core/camera_model.h"
 #include "core/keyframe.h"
+#include "vio/front_end/patch_network.h"
+#include "vio/front_end/patch_sampler.h"
 #include "vio/front_end/tracks.h"
 
 namespace pangea::vio {
 
 struct DescriberOptions {
+  DescriptorKind descriptor = DescriptorKind::kPatchNetwork;
   int max_blobs = 240;  // at most, of a keyframe's kMaxCorners
 
   template <typename Archive>
   void Visit(Archive& archive) {
+    archive.AddChoice("descriptor", &descriptor,
+                      {{"orb", DescriptorKind::kOrb}, {"network", DescriptorKind::kPatchNetwork}},
+                      "of corners; `orb` to be recognised in maps of versions before 0.3");
     archive.Add("max_blobs", &max_blobs, {0, kMaxCorners}, "",
                 "of a keyframe's corners, beside landmarks");
   }
@@ -35,8 +43,12 @@ class Describer {
   Describer(const CameraModel& camera, const DescriberOptions& options);
 
   // Corners of the image: first those with a landmark_id, in the order of the frame; then the
-  // others, blobs and FAST corners alternating.
-  std::vector<Corner> Describe(const cv::Mat& image, const TrackedFrame& frame);
+  // others, blobs and FAST corners alternating. `down_cam`: the direction of gravity in the camera
+  // frame; zero if not known, then the image is taken as upright.
+  std::vector<Corner> Describe(const cv::Mat& image, const TrackedFrame& frame,
+                               const Eigen::Vector3d& down_cam);
+
+  DescriptorKind kind() const { return options_.descriptor; }
 
  private:
   struct Candidate {
@@ -58,12 +70,21 @@ class Describer {
   cv::Point2f ToLevel(int octave, const Eigen::Vector2f& pixel) const;
   Eigen::Vector2f ToImage(int octave, const cv::Point2f& level_pixel) const;
   float Angle(int octave, const cv::Point2f& level_pixel) const;
-  std::vector<Corner> Compute(const std::vector<Candidate>& candidates) const;
+  Corner ToCorner(const Candidate& candidate) const;
+  std::vector<Corner> ComputeOrb(const std::vector<Candidate>& candidates) const;
+  // `step_px`: width of the patch's pixels, in pixels of the image.
+  PatchNetwork::Patch PatchAt(const Eigen::Vector2f& pixel, double step_px,
+                              const PatchSampler& sampler) const;
+  // Both return the descriptions in the order of what is described.
+  std::vector<Corner> DescribeCorners(const std::vector<Candidate>& candidates,
+                                      const Eigen::Vector3d& down_cam) const;
+  std::vector<Corner> DescribeBlobs(const cv::Mat& image, int wanted,
+                                    const Eigen::Vector3d& down_cam) const;
 
   CameraModel camera_;
   DescriberOptions options_;
-  std::vector<double> scales_;  // nominal scale of each octave
-  std::vector<cv::Mat> pyramid_;
+  std::vector<double> scales_;                     // nominal scale of each octave with corners
+  std::vector<cv::Mat> pyramid_;                   // has some coarser octaves too, for patches
   std::vector<std::vector<cv::KeyPoint>> strong_;  // corners of each octave, row by row
   cv::Ptr<cv::ORB> orb_;
 };

@@ -1,6 +1,6 @@
 // Measures keyframe descriptions against a recording's ground truth: of the matches between two
-// views, how many agree with one motion near the true one; for views close in time and for later
-// visits of the same place.
+// views more than 0.1 m apart, how many agree with one motion near the true one; by the angle
+// between the views.
 
 #include <fmt/format.h>
 
@@ -62,10 +62,11 @@ struct Views {
 };
 
 // One view each `step_s` seconds, where the truth is known.
-Views DescribeAll(const EurocRecording& recording, double step_s, bool landmarks) {
+Views DescribeAll(const EurocRecording& recording, double step_s, bool landmarks,
+                  const DescriberOptions& options) {
   const CameraModel& camera = recording.camera();
   Tracker tracker(camera, {});
-  Describer describer(camera, {});
+  Describer describer(camera, options);
   Views all;
   for (size_t i = 0; i < recording.images().size(); ++i) {
     const EurocImage& entry = recording.images()[i];
@@ -84,8 +85,11 @@ Views DescribeAll(const EurocRecording& recording, double step_s, bool landmarks
     tracker.Reset();
     const TrackedFrame& frame = tracker.Track(entry.utime, image, Eigen::Quaterniond::Identity());
     const std::clock_t begin = std::clock();
+    const Rigid3 T_reference_cam = *T * camera.T_body_cam;
     all.views.push_back(
-        {t, *T * camera.T_body_cam, describer.Describe(image, landmarks ? frame : TrackedFrame{})});
+        {t, T_reference_cam,
+         describer.Describe(image, landmarks ? frame : TrackedFrame{},
+                            -(T_reference_cam.q.conjugate() * Eigen::Vector3d::UnitZ()))});
     all.milliseconds += 1e3 * static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
     all.corners += static_cast<double>(all.views.back().corners.size());
   }
@@ -93,28 +97,25 @@ Views DescribeAll(const EurocRecording& recording, double step_s, bool landmarks
 }
 
 struct Tallies {
-  Tally near, revisit, unlike;
+  Tally slight, rotated, unlike;
 
   // The tally that counts two views; null if none does.
   Tally* Of(const View& a, const View& b) {
-    const double dt = b.time_s - a.time_s;
+    constexpr double kDegree = 0.017453292519943295;
     const Rigid3 T_a_b = a.T_reference_cam.Inverse() * b.T_reference_cam;
     const double angle = T_a_b.q.angularDistance(Eigen::Quaterniond::Identity());
-    if (T_a_b.t.norm() < 0.05) {
+    if (T_a_b.t.norm() < 0.1) {
       return nullptr;  // too short a baseline for an epipolar line
     }
-    if (dt < 1.3) {
-      return &near;
+    if (angle < 25 * kDegree) {
+      return angle < 12 * kDegree ? &slight : &rotated;
     }
-    if (dt > 8 && angle < 0.5 && T_a_b.t.norm() < 1.5) {
-      return &revisit;
-    }
-    return angle > 1.8 ? &unlike : nullptr;
+    return angle > 103 * kDegree ? &unlike : nullptr;
   }
 };
 
-Tallies MatchAll(const CameraModel& camera, const std::vector<View>& views) {
-  constexpr int kMaxPairs = 300;
+Tallies MatchAll(const CameraModel& camera, const std::vector<View>& views, DescriptorKind kind) {
+  constexpr int kMaxPairs = 1000;
   Tallies tallies;
   for (size_t i = 0; i < views.size(); ++i) {
     for (size_t j = i + 1; j < views.size(); ++j) {
@@ -123,7 +124,8 @@ Tallies MatchAll(const CameraModel& camera, const std::vector<View>& views) {
         continue;
       }
       ++tally->pairs;
-      const auto matches = MatchCorners(views[i].corners, views[j].corners, {});
+      const auto matches =
+          MatchCorners(views[i].corners, views[j].corners, {.max_distance = LimitsOf(kind).alike});
       tally->matches += static_cast<double>(matches.size());
       tally->correct += Consistent(camera, views[i], views[j], matches);
     }
@@ -131,16 +133,17 @@ Tallies MatchAll(const CameraModel& camera, const std::vector<View>& views) {
   return tallies;
 }
 
-void Run(const std::string& folder, double step_s, bool landmarks) {
+void Run(const std::string& folder, double step_s, bool landmarks,
+         const DescriberOptions& options) {
   const EurocRecording recording(folder);
-  const auto [views, milliseconds, corners] = DescribeAll(recording, step_s, landmarks);
+  const auto [views, milliseconds, corners] = DescribeAll(recording, step_s, landmarks, options);
   const auto n = static_cast<double>(views.size());
   fmt::print("{} views, {:.0f} corners each, {:.1f} ms each\n", views.size(), corners / n,
              milliseconds / n);
-  const Tallies tallies = MatchAll(recording.camera(), views);
-  tallies.near.Print("0.3 .. 1.3 s apart");
-  tallies.revisit.Print("a later visit within 1.5 m and 29 degrees");
-  tallies.unlike.Print("another direction (over 103 degrees)");
+  const Tallies tallies = MatchAll(recording.camera(), views, options.descriptor);
+  tallies.slight.Print("rotation of 0 to 12 degrees");
+  tallies.rotated.Print("rotation of 12 to 25 degrees");
+  tallies.unlike.Print("rotation of over 103 degrees");
 }
 
 }  // namespace
@@ -150,14 +153,19 @@ int main(int argc, char** argv) {
   std::string recording;
   double step_s = 0.4;
   bool landmarks = true;
+  bool orb = false;
+  pangea::vio::DescriberOptions options;
   CLI::App app("Measures keyframe descriptions against ground truth", "pangea-vio-describer-bench");
   app.add_option("recording", recording)->required();
   app.add_option("--step", step_s, "seconds between views");
   app.add_option("--landmarks", landmarks, "0: no tracked landmarks, corners only");
+  app.add_flag("--orb", orb, "in place of the network");
+  app.add_option("--max-blobs", options.max_blobs);
   CLI11_PARSE(app, argc, argv);
+  options.descriptor = orb ? pangea::DescriptorKind::kOrb : pangea::DescriptorKind::kPatchNetwork;
   cv::setNumThreads(1);
   try {
-    pangea::vio::Run(recording, step_s, landmarks);
+    pangea::vio::Run(recording, step_s, landmarks, options);
   } catch (const std::exception& error) {
     std::cerr << error.what() << "\n";
     return 1;

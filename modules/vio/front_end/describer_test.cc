@@ -15,6 +15,8 @@
 namespace pangea::vio {
 namespace {
 
+const Eigen::Vector3d kUpright = Eigen::Vector3d::UnitY();  // gravity in the camera frame
+
 TrackedFrame Tracks(const cv::Mat& image) {
   Tracker tracker(PlainCamera(), {});
   return tracker.Track(0, image, Eigen::Quaterniond::Identity());
@@ -24,7 +26,7 @@ TEST(Describer, PutsEveryLandmarkFirstWithItsPixel) {
   const cv::Mat image = RandomTexture(752, 480, 1);
   const TrackedFrame frame = Tracks(image);
   Describer describer(PlainCamera(), {});
-  const std::vector<Corner> corners = describer.Describe(image, frame);
+  const std::vector<Corner> corners = describer.Describe(image, frame, kUpright);
   EXPECT_LE(corners.size(), 700u);
   EXPECT_GE(corners.size(), 500u);
   size_t landmarks = 0;
@@ -52,9 +54,10 @@ TEST(Describer, BlobsAndCornersTakeTurns) {
   DescriberOptions options;
   options.max_blobs = 0;
   const cv::Mat image = RandomTexture(752, 480, 2);
-  const std::vector<Corner> only_corners = Describer(PlainCamera(), options).Describe(image, {});
+  const std::vector<Corner> only_corners =
+      Describer(PlainCamera(), options).Describe(image, {}, kUpright);
   options.max_blobs = 100;
-  const std::vector<Corner> both = Describer(PlainCamera(), options).Describe(image, {});
+  const std::vector<Corner> both = Describer(PlainCamera(), options).Describe(image, {}, kUpright);
   EXPECT_EQ(both.size(), only_corners.size());
   int blobs = 0;
   for (int i = 0; i < 100; ++i) {
@@ -66,7 +69,7 @@ TEST(Describer, BlobsAndCornersTakeTurns) {
 
 TEST(Describer, CoversTheImageAndSeveralOctaves) {
   Describer describer(PlainCamera(), {});
-  const std::vector<Corner> corners = describer.Describe(RandomTexture(752, 480, 2), {});
+  const std::vector<Corner> corners = describer.Describe(RandomTexture(752, 480, 2), {}, kUpright);
   std::vector<int> part(4, 0);
   std::map<int, int> octave;
   for (const Corner& corner : corners) {
@@ -84,8 +87,8 @@ TEST(Describer, CoversTheImageAndSeveralOctaves) {
 double CorrectShare(const cv::Mat& a, const cv::Mat& b, const Eigen::Quaterniond& q_b_a,
                     int* matches) {
   Describer describer(PlainCamera(), {});
-  const std::vector<Corner> corners_a = describer.Describe(a, Tracks(a));
-  const std::vector<Corner> corners_b = describer.Describe(b, Tracks(b));
+  const std::vector<Corner> corners_a = describer.Describe(a, Tracks(a), kUpright);
+  const std::vector<Corner> corners_b = describer.Describe(b, Tracks(b), kUpright);
   int correct = 0;
   const auto found = MatchCorners(corners_a, corners_b, {});
   for (const CornerMatch& match : found) {
@@ -123,8 +126,8 @@ TEST(Describer, DescriptorsSurviveScaleAndExposure) {
   cv::remap(image, zoomed, map_x, map_y, cv::INTER_CUBIC);
   zoomed.convertTo(zoomed, CV_8U, 0.8, -5);
   Describer describer(PlainCamera(), {});
-  const auto far_corners = describer.Describe(image, Tracks(image));
-  const auto near_corners = describer.Describe(zoomed, Tracks(zoomed));
+  const auto far_corners = describer.Describe(image, Tracks(image), kUpright);
+  const auto near_corners = describer.Describe(zoomed, Tracks(zoomed), kUpright);
   int correct = 0;
   const auto found = MatchCorners(far_corners, near_corners, {});
   for (const CornerMatch& match : found) {
@@ -139,7 +142,7 @@ TEST(Describer, DescriptorsSurviveScaleAndExposure) {
 
 TEST(Describer, ABlankImageHasNoCorners) {
   Describer describer(PlainCamera(), {});
-  EXPECT_TRUE(describer.Describe(cv::Mat(480, 752, CV_8U, cv::Scalar(80)), {}).empty());
+  EXPECT_TRUE(describer.Describe(cv::Mat(480, 752, CV_8U, cv::Scalar(80)), {}, kUpright).empty());
 }
 
 }  // namespace

@@ -101,6 +101,7 @@ std::optional<LocalizationPrior> MapLocalisation::PriorAt(const WindowPoses& win
 // is matched to one landmark at most.
 std::vector<MapLocalisation::Match> MapLocalisation::FindIn(const CameraModel& camera,
                                                             const std::vector<Corner>& corners,
+                                                            const MatchingOptions& matching,
                                                             const Rigid3& T_map_cam) const {
   const CornerGrid grid(corners);
   const Rigid3 T_cam_map = T_map_cam.Inverse();
@@ -110,7 +111,7 @@ std::vector<MapLocalisation::Match> MapLocalisation::FindIn(const CameraModel& c
     const auto pixel = p_cam.z() > kMinSearchDepth ? camera.Project(p_cam) : std::nullopt;
     const auto match =
         pixel && camera.Contains(*pixel, kBorder_px)
-            ? grid.Nearest(*pixel, options_.search_radius_px, known.descriptor, options_.matching)
+            ? grid.Nearest(*pixel, options_.search_radius_px, known.descriptor, matching)
             : std::nullopt;
     if (match) {
       const std::pair found(match->distance, key);
@@ -163,7 +164,7 @@ MapLocalisation::Seen MapLocalisation::SeenIn(const WindowPoses& window) const {
 }
 
 void MapLocalisation::AddKeyframe(const CameraModel& camera, const std::vector<Corner>& corners,
-                                  const WindowPoses& window) {
+                                  DescriptorKind kind, const WindowPoses& window) {
   std::erase_if(matches_, [&](const auto& seen) {
     return std::find(window.utimes.begin(), window.utimes.end(), seen.first) == window.utimes.end();
   });
@@ -174,7 +175,7 @@ void MapLocalisation::AddKeyframe(const CameraModel& camera, const std::vector<C
   }
   const Rigid3 T_map_cam = *T_map_odom() * window.T_odom_body.back() * camera.T_body_cam;
   std::vector<Match>& found = matches_[window.utimes.back()];
-  found = FindIn(camera, corners, T_map_cam);
+  found = FindIn(camera, corners, {.max_distance = LimitsOf(kind).alike}, T_map_cam);
   counters_.seen += static_cast<int64_t>(found.size());
   const Seen seen = SeenIn(window);
   localized_ = LocalizeWindow(window, camera.T_body_cam, *prior, seen.sources, seen.landmarks,

@@ -31,7 +31,6 @@ struct MapLocalisationOptions {
   LocalizationOptions localization;
   // Search radius around a landmark's predicted position, pixels.
   double search_radius_px = 15;
-  MatchingOptions matching;
   double pixel_sigma = 1.5;  // of a corner that matches a landmark, on octave 0
 };
 
@@ -53,9 +52,9 @@ class MapLocalisation {
   bool HasLandmarks() const { return !known_.empty(); }
   size_t num_landmarks() const { return known_.size(); }
   // Call when the window's newest pose is a keyframe. `corners`: of that keyframe, with rolling
-  // shutter compensated.
+  // shutter compensated; their descriptors are of this kind.
   void AddKeyframe(const CameraModel& camera, const std::vector<Corner>& corners,
-                   const WindowPoses& window);
+                   DescriptorKind kind, const WindowPoses& window);
 
   // Empty before the first correction.
   std::optional<Rigid3> T_map_odom() const;
@@ -96,7 +95,7 @@ class MapLocalisation {
   void ForgetOldest();
   std::optional<LocalizationPrior> PriorAt(const WindowPoses& window) const;
   std::vector<Match> FindIn(const CameraModel& camera, const std::vector<Corner>& corners,
-                            const Rigid3& T_map_cam) const;
+                            const MatchingOptions& matching, const Rigid3& T_map_cam) const;
   Seen SeenIn(const WindowPoses& window) const;
 
   MapLocalisationOptions options_;

@@ -77,7 +77,7 @@ TEST_F(MapLocalisationTest, LandmarksSharpenACorrection) {
   ASSERT_TRUE(localization_.Correct(CorrectionOff({0.02, -0.02, 0.01}, 1)));
   EXPECT_NEAR(Error(), 0.03, 1e-9);
   ASSERT_TRUE(localization_.Take(landmarks_));
-  localization_.AddKeyframe(camera_, corners_, window_);
+  localization_.AddKeyframe(camera_, corners_, DescriptorKind::kOrb, window_);
   EXPECT_EQ(localization_.counters().localised, 1);
   EXPECT_EQ(localization_.counters().seen, 40);
   EXPECT_LT(Error(), 0.015);
@@ -87,7 +87,7 @@ TEST_F(MapLocalisationTest, WithoutLandmarksItIsTheCorrection) {
   EXPECT_FALSE(localization_.T_map_odom());
   ASSERT_TRUE(localization_.Correct(CorrectionOff({0.02, 0, 0}, 4)));
   EXPECT_FALSE(localization_.HasLandmarks());
-  localization_.AddKeyframe(camera_, corners_, window_);
+  localization_.AddKeyframe(camera_, corners_, DescriptorKind::kOrb, window_);
   EXPECT_NEAR(Error(), 0.02, 1e-12);
   EXPECT_FALSE(localization_.Correct(CorrectionOff({0, 0, 0}, 4)));  // not newer
   EXPECT_NEAR(Error(), 0.02, 1e-12);
@@ -96,10 +96,10 @@ TEST_F(MapLocalisationTest, WithoutLandmarksItIsTheCorrection) {
 TEST_F(MapLocalisationTest, WhenNothingIsFoundItIsTheCorrectionAgain) {
   localization_.Correct(CorrectionOff({0.02, 0, 0}, 1));
   localization_.Take(landmarks_);
-  localization_.AddKeyframe(camera_, corners_, window_);
+  localization_.AddKeyframe(camera_, corners_, DescriptorKind::kOrb, window_);
   ASSERT_LT(Error(), 0.015);
   window_.utimes = {2};
-  localization_.AddKeyframe(camera_, {}, window_);
+  localization_.AddKeyframe(camera_, {}, DescriptorKind::kOrb, window_);
   EXPECT_NEAR(Error(), 0.02, 1e-12);
   EXPECT_EQ(localization_.counters().not_localised, 1);
 }
@@ -130,7 +130,7 @@ TEST_F(MapLocalisationTest, MemoryIsBounded) {
     localization_.Take(more);
   }
   // It only keeps the landmarks of the newest ten messages.
-  localization_.AddKeyframe(camera_, corners_, window_);
+  localization_.AddKeyframe(camera_, corners_, DescriptorKind::kOrb, window_);
   EXPECT_LE(localization_.counters().seen, 40);
   EXPECT_EQ(localization_.num_landmarks(), MapLocalisation::kMaxLandmarks);
 }

@@ -113,7 +113,7 @@ export interface PhoneEvents {
   others?: Others;
   /** Changes of the stored keyframes and edits of anchors, to be applied in this order. */
   spool: SpoolChange[];
-  /** Newly finished keyframes (encoded keyframe_t or keyframe_2_t), for --out-keyframes and tests. */
+  /** Newly finished keyframes (encoded keyframe_t, keyframe_2_t or keyframe_3_t), for --out-keyframes and tests. */
   keyframes: Uint8Array[];
 }
 

@@ -5,7 +5,7 @@ import { closeSync, openSync, writeSync } from "node:fs";
 import type { PhonePose } from "../agent/phone_agent";
 
 const kLogMagic = 0xeda1da01;
-const kUtimeOffset = 24; // of utime in keyframe_t and keyframe_2_t: after the fingerprint and the id
+const kUtimeOffset = 24; // of utime in keyframe_t and its successors: after the fingerprint and the id
 
 export class TumFiles {
   private file?: number;
