@@ -261,10 +261,19 @@ TEST(Errors, OfAFolderThatCannotBeUsedBeginWithItsPath) {
             "pangea-session: " + too_long + "/session.lcm: cannot be used: File name too long\n");
 }
 
+TEST(Keygen, MakesTheFolderForItsOwnerAlone) {
+  const fs::path folder = FreshFolder("keygen");
+  const fs::path key = folder / "site" / "keys" / "agent_4.key";
+  const Outcome outcome = RunCommand("pangea-agent-handler keygen --agent 4 --out " + key.string());
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_TRUE(fs::is_regular_file(key));
+  EXPECT_EQ(fs::status(key.parent_path()).permissions(), fs::perms::owner_all);
+}
+
 // No server answers on this link; the player, which would wait 20 s for one, is told to end.
 TEST(Uplink, SaysAtItsEndWhatIsLostWithoutASpool) {
   const Outcome outcome = RunCommand(
-      "(rm -rf lost && mkdir -m 700 lost && pangea-agent-handler keygen --agent 1 --out lost/key "
+      "(rm -rf lost && pangea-agent-handler keygen --agent 1 --out lost/key "
       "&& "
       "timeout -s INT 9 pangea-uplink --agent 1 --key lost/key --bus 'udpm://239.255.76.67:20013' "
       "--link 'udpm://239.255.76.68:20014' & sleep 2 && "
