@@ -264,7 +264,7 @@ int Serve(const ServerSetup& options) {
                       process));
     }
   }
-  Say("brings the checkpoints up to date; another Ctrl-C leaves them as they are");
+  Say("writes the checkpoints, so that the next start is quick; press Ctrl-C again to skip this");
   checkpoints.Finish();
   Say("ended");
   return given_up.empty() ? 0 : 1;
