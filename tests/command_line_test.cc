@@ -246,6 +246,13 @@ TEST(Eval, StretchesHaveALength) {
   }
 }
 
+TEST(Eval, TheHelpNamesBothFiles) {
+  for (const char* command : {"ate", "rpe"}) {
+    const Outcome outcome = RunCommand(fmt::format("pangea-eval {} --help", command));
+    EXPECT_THAT(outcome.output, testing::ContainsRegex("Usage:.* ESTIMATE REFERENCE"));
+  }
+}
+
 TEST(Eval, TheEstimateComesFirst) {
   const Outcome outcome = RunCommand("pangea-eval ate " PANGEA_SOURCE_DIR "/logs a.tum");
   EXPECT_EQ(outcome.exit_code, 1) << outcome.output;
