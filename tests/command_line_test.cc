@@ -238,6 +238,15 @@ TEST(Session, ARecordingThatIsGivenIsThere) {
   EXPECT_THAT(outcome.output, HasSubstr("--recording 1=nowhere: there is no such folder"));
 }
 
+TEST(Vio, FindsARecordingByItsNameAsASessionDoes) {
+  const fs::path folder = FreshFolder("vio_recording");
+  fs::create_directories(folder / "MH_01_easy" / "mav0");
+  const Outcome outcome =
+      RunCommand("cd " + folder.string() + " && pangea-vio --agent 1 --bus none --recording MH_01");
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_THAT(outcome.output, testing::StartsWith("pangea-vio: plays ./MH_01_easy\n"));
+}
+
 TEST(Eval, StretchesHaveALength) {
   for (const char* option : {"--distances 1,0", "--durations -1", "--max-gap 0"}) {
     const Outcome outcome = RunCommand(std::string("pangea-eval rpe a.tum b.tum ") + option);
