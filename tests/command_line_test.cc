@@ -238,11 +238,27 @@ TEST(Session, ARecordingThatIsGivenIsThere) {
   EXPECT_THAT(outcome.output, HasSubstr("--recording 1=nowhere: there is no such folder"));
 }
 
+TEST(Vio, FindsARecordingByItsNameAsASessionDoes) {
+  const fs::path folder = FreshFolder("vio_recording");
+  fs::create_directories(folder / "MH_01_easy" / "mav0");
+  const Outcome outcome =
+      RunCommand("cd " + folder.string() + " && pangea-vio --agent 1 --bus none --recording MH_01");
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_THAT(outcome.output, testing::StartsWith("pangea-vio: plays ./MH_01_easy\n"));
+}
+
 TEST(Eval, StretchesHaveALength) {
   for (const char* option : {"--distances 1,0", "--durations -1", "--max-gap 0"}) {
     const Outcome outcome = RunCommand(std::string("pangea-eval rpe a.tum b.tum ") + option);
     EXPECT_GT(outcome.exit_code, 100) << outcome.output;
     EXPECT_THAT(outcome.output, HasSubstr("is no number"));
+  }
+}
+
+TEST(Eval, TheHelpNamesBothFiles) {
+  for (const char* command : {"ate", "rpe"}) {
+    const Outcome outcome = RunCommand(fmt::format("pangea-eval {} --help", command));
+    EXPECT_THAT(outcome.output, testing::ContainsRegex("Usage:.* ESTIMATE REFERENCE"));
   }
 }
 
@@ -261,10 +277,19 @@ TEST(Errors, OfAFolderThatCannotBeUsedBeginWithItsPath) {
             "pangea-session: " + too_long + "/session.lcm: cannot be used: File name too long\n");
 }
 
+TEST(Keygen, MakesTheFolderForItsOwnerAlone) {
+  const fs::path folder = FreshFolder("keygen");
+  const fs::path key = folder / "site" / "keys" / "agent_4.key";
+  const Outcome outcome = RunCommand("pangea-agent-handler keygen --agent 4 --out " + key.string());
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.output;
+  EXPECT_TRUE(fs::is_regular_file(key));
+  EXPECT_EQ(fs::status(key.parent_path()).permissions(), fs::perms::owner_all);
+}
+
 // No server answers on this link; the player, which would wait 20 s for one, is told to end.
 TEST(Uplink, SaysAtItsEndWhatIsLostWithoutASpool) {
   const Outcome outcome = RunCommand(
-      "(rm -rf lost && mkdir -m 700 lost && pangea-agent-handler keygen --agent 1 --out lost/key "
+      "(rm -rf lost && pangea-agent-handler keygen --agent 1 --out lost/key "
       "&& "
       "timeout -s INT 9 pangea-uplink --agent 1 --key lost/key --bus 'udpm://239.255.76.67:20013' "
       "--link 'udpm://239.255.76.68:20014' & sleep 2 && "

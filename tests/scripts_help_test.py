@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
-"""Tests that --help of each script that users start prints its purpose and does nothing else, even if the real run takes long."""
+"""Tests that --help of each script that users start prints its purpose and does nothing else, even if the real run takes long; and what
+scripts/spy says without a display."""
 
+import os
 import subprocess
 import unittest
 from pathlib import Path
@@ -31,6 +33,14 @@ class ScriptsHelp(unittest.TestCase):
                 self.assertIn(path.name, shown)
             count += 1
         self.assertGreater(count, 20)
+
+    def test_spy_without_display(self):
+        environment = {name: value for name, value in os.environ.items() if name != "DISPLAY"}
+        for path in (ROOT / "scripts/spy", ROOT / "packaging/pangea-spy"):
+            told = subprocess.run([path], capture_output=True, text=True, timeout=20, env=environment)
+            self.assertEqual(told.returncode, 1, path)
+            self.assertRegex(told.stderr, r"\Apangea-spy: there is no display .*\n\Z")
+            self.assertEqual(told.stdout, "")
 
 
 if __name__ == "__main__":

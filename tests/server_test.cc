@@ -55,6 +55,39 @@ TEST(Server, RunsAllStartsAgainWhatDiesAndEndsInOrder) {
   EXPECT_TRUE(fs::exists(folder / "map.lcm.logs" / "fusion.txt"));
 }
 
+TEST(Server, SaysWhichAgentsJoinAndWhichAreRefused) {
+  const fs::path folder = FreshFolder("server_agents");
+  const int port = 20000 + getpid() % 6000 * 2;
+  const auto uplink = [&](int agent, const std::string& key) {
+    return fmt::format(
+        "timeout -s INT 9 pangea-uplink --agent {0} --key {1} --bus 'udpm://239.255.76.68:{2}' "
+        "--link 'udpm://239.255.76.67:{3}?ttl=0&recv_buf_size=4194304' & up{0}=$!\n",
+        agent, (folder / key).string(), port + agent % 2, port + 1);
+  };
+  std::ofstream(folder / "run.sh")
+      << fmt::format(
+             "pangea-agent-handler keygen --agent 1 --out {0}/keys/agent_1.key\n"
+             "pangea-agent-handler keygen --agent 6 --out {0}/agent_6.key\n"
+             "{1} & server=$!; sleep 2\n",
+             folder.string(), ServerCommand(folder))
+      << uplink(1, "keys/agent_1.key") << uplink(6, "agent_6.key")
+      << fmt::format(
+             "sleep 2; timeout -s INT 5 pangea-keyframe-player --agent 1 --rate 20 --bus "
+             "'udpm://239.255.76.68:{}' --keyframes {}\n"
+             "wait $up1 $up6; kill -INT $server; wait $server\n",
+             port + 1, kSample);
+  const Outcome outcome = RunCommand("sh " + (folder / "run.sh").string());
+  for (const std::string& line :
+       {std::string("agent 1 has joined"),
+        std::string("agent 1 sends keyframes: the first is in the journal"),
+        fmt::format("agent 6 is refused: the folder of keys, {}/keys, has no key for it",
+                    folder.string())}) {
+    const size_t at = outcome.output.find("\n" + line + "\n");
+    EXPECT_NE(at, std::string::npos) << line << "\n" << outcome.output;
+    EXPECT_EQ(outcome.output.find("\n" + line + "\n", at + 1), std::string::npos) << line;
+  }
+}
+
 // In the second run the port of the server's own gateway is in use.
 TEST(Server, StartsTheGatewayForPhonesAndEndsIfItCannot) {
   const fs::path folder = FreshFolder("server_phone");

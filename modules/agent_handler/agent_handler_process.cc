@@ -161,7 +161,10 @@ void AgentHandlerProcess::OnLinkUp(const std::string& channel, Bytes data) {
   Agent& agent = found->second;
   const HandlerSession::Opened opened = agent.session.Open(data);
   if (!opened.refused.empty()) {
-    agent.hellos_refused += opened.refused == kHelloNotOpened ? 1 : 0;
+    if (opened.refused == kHelloNotOpened && ++agent.hellos_refused == kManyHellos) {
+      TellOnce(agent_id, fmt::format("is refused: it has another key than the server's {}/{}",
+                                     key_folder_name_, KeyFileName(agent_id)));
+    }
     return node_.Refuse(opened.refused);
   }
   agent.hellos_refused = 0;
@@ -181,12 +184,19 @@ void AgentHandlerProcess::OnLinkUp(const std::string& channel, Bytes data) {
 
 // Anyone can send as any agent, so only a few are named: a node tells a limited number of reasons.
 void AgentHandlerProcess::RefuseStranger(int32_t agent_id) {
-  if (strangers_.size() < kMaxStrangers) {
-    strangers_.insert(agent_id);
+  if (strangers_.size() < kMaxStrangers && strangers_.insert(agent_id).second) {
+    TellOnce(agent_id, fmt::format("is refused: the folder of keys, {}, has no key for it",
+                                   key_folder_name_));
   }
   const std::string who =
       strangers_.contains(agent_id) ? fmt::format("agent {},", agent_id) : "an agent";
   node_.Refuse("packet of " + who + " whose key is not in the folder of keys");
+}
+
+void AgentHandlerProcess::TellOnce(int32_t agent_id, const std::string& what) {
+  if (told_.emplace(agent_id, what).second) {
+    Log(node_.name(), fmt::format("agent {} {}", agent_id, what));
+  }
 }
 
 // Lets the agent join if it has not yet.
@@ -205,6 +215,7 @@ bool AgentHandlerProcess::HasJoined(int32_t agent_id, Agent* agent) {
 void AgentHandlerProcess::TakePacket(int32_t agent_id, Agent* agent,
                                      const HandlerSession::Opened& opened) {
   if (opened.two_uplinks) {
+    TellOnce(agent_id, "has two uplinks: end one, or give it an id and a key of its own");
     node_.Refuse(fmt::format(
         "two uplinks run as agent {}: end one, or give it an id and a key of its own", agent_id));
   }
@@ -264,7 +275,9 @@ int AgentHandlerProcess::Poll(int64_t steady_us) {
   for (const KeyframeId& id : archive_.Sync()) {
     const auto agent = agents_.find(id.map.agent_id);
     if (agent != agents_.end() && agent->second.handler) {
-      ++agent->second.keyframes;
+      if (++agent->second.keyframes == 1) {
+        TellOnce(id.map.agent_id, "sends keyframes: the first is in the journal");
+      }
       agent->second.handler->Journalled(id);
     }
   }

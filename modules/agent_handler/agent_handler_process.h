@@ -54,6 +54,8 @@ class AgentHandlerProcess : public PolledProcess {
   };
   void OnLinkUp(const std::string& channel, Bytes data);
   void RefuseStranger(int32_t agent_id);
+  // A line in the log about an agent, once; pangea-server shows it.
+  void TellOnce(int32_t agent_id, const std::string& what);
   bool HasJoined(int32_t agent_id, Agent* agent);
   void TakePacket(int32_t agent_id, Agent* agent, const HandlerSession::Opened& opened);
   // Whether the agent's uplink sent something lately.
@@ -85,10 +87,11 @@ class AgentHandlerProcess : public PolledProcess {
   Node node_;
   Archive archive_;
   AnchorRelay anchors_;
-  std::map<int32_t, Agent> agents_;          // all agents with a key
-  std::set<int32_t> strangers_;              // agents without one, the first kMaxStrangers
-  std::map<MapId, Correction> corrections_;  // the newest one of each map, at most 16,000
-  MissingStates missing_corrections_;        // for maps that were in the journal at the start
+  std::map<int32_t, Agent> agents_;                 // all agents with a key
+  std::set<int32_t> strangers_;                     // agents without one, the first kMaxStrangers
+  std::set<std::pair<int32_t, std::string>> told_;  // by TellOnce
+  std::map<MapId, Correction> corrections_;         // the newest one of each map, at most 16,000
+  MissingStates missing_corrections_;  // for maps that were in the journal at the start
   int64_t now_us_ = 0;
   int64_t next_have_utime_ = 0;
 };

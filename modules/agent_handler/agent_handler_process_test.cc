@@ -1,5 +1,6 @@
 #include "agent_handler/agent_handler_process.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -9,6 +10,7 @@
 #include <utility>
 
 #include "agent_handler/link_test_world.h"
+#include "bus/status_log.h"
 #include "files/testing/full_disk.h"
 #include "link/agent_key.h"
 #include "log_file/log_writer.h"
@@ -28,6 +30,36 @@ TEST_F(LinkWorld, KeyframesArriveOnceInOrderByteIdentical) {
   Run(20);
   ExpectDelivered(50);
   EXPECT_EQ(acknowledged, 49);
+}
+
+// pangea-server shows these lines.
+TEST_F(LinkWorld, WhoComesAndWhoIsRefusedIsToldOnce) {
+  testing::internal::CaptureStderr();
+  StartLog("pangea-test", "");
+  PublishKeyframes(5);
+  Run(2);
+  KillUplink();
+  std::filesystem::rename(KeyFile(1), folder / "server.key");
+  MakeKeyFile(KeyFile(1), 1);
+  StartUplink();  // with another key
+  std::filesystem::rename(folder / "server.key", KeyFile(1));
+  for (int second = 0; second < 10; ++second) {
+    link_bus.Publish("LINK_UP_7", std::vector<uint8_t>(50));
+    Run(1);
+  }
+  const std::string log = testing::internal::GetCapturedStderr();
+  for (const std::string& line :
+       {std::string("agent 1 has joined"),
+        std::string("agent 1 sends keyframes: the first is in the journal"),
+        fmt::format("agent 1 is refused: it has another key than the server's {}/keys/agent_1.key",
+                    folder.string()),
+        fmt::format("agent 7 is refused: the folder of keys, {}/keys, has no key for it",
+                    folder.string())}) {
+    const std::string whole = "\nagent_handler: " + line + "\n";
+    const size_t at = log.find(whole);
+    EXPECT_NE(at, std::string::npos) << line << "\n" << log;
+    EXPECT_EQ(log.find(whole, at + 1), std::string::npos) << line;
+  }
 }
 
 TEST_F(LinkWorld, HandlerKilledAndRestartedGoesOnFromItsJournal) {

@@ -70,7 +70,8 @@ class CommandLine {
   void RunRelative() const;
 
   std::function<void()> chosen_;
-  std::vector<std::string> files_;  // estimate, reference, estimate, reference, ...
+  std::string estimate_, reference_;  // of ate and rpe
+  std::vector<std::string> files_;    // estimate, reference, estimate, reference, ...
   double max_gap_s_ = 1e-6 * kMaxGroundTruthGapUs;
   std::string json_path_;
   std::string plot_prefix_;
@@ -84,17 +85,21 @@ CommandLine::CommandLine(CLI::App& app) {
   CLI::App* joint = app.add_subcommand(
       "joint", "absolute error of several agents' trajectories in one map: one alignment for all");
   CLI::App* rpe = app.add_subcommand("rpe", "relative error over stretches of path and of time");
+  const std::string kinds =
+      "TUM file or EuRoC ground-truth csv, for ate and joint also of positions alone (stamp x y z)";
+  for (CLI::App* command : {ate, rpe}) {
+    command->add_option("ESTIMATE", estimate_, "the trajectory to evaluate: " + kinds)->required();
+    command
+        ->add_option("REFERENCE", reference_,
+                     "the ground truth: a recording's folder, or a file of these kinds")
+        ->required();
+  }
+  joint
+      ->add_option("ESTIMATE_REFERENCE", files_,
+                   "of each agent ESTIMATE, then REFERENCE: " + kinds +
+                       "; REFERENCE may be a recording's folder")
+      ->required();
   for (CLI::App* command : {ate, joint, rpe}) {
-    auto* files = command->add_option(
-        "files", files_,
-        "ESTIMATE REFERENCE" + std::string(command == joint ? " [ESTIMATE REFERENCE]..." : "") +
-            ": TUM files or EuRoC ground-truth csv, for ate and joint also of positions alone "
-            "(stamp x "
-            "y z); REFERENCE may be a recording's folder");
-    files->required();
-    if (command != joint) {
-      files->expected(2);
-    }
     AddCommon(*command);
   }
   for (CLI::App* command : {ate, joint}) {
@@ -117,7 +122,12 @@ void CommandLine::AddCommon(CLI::App& command) {
                      "write the metrics to this file; -: to stdout, in place of the table");
 }
 
-void CommandLine::Run() { chosen_(); }
+void CommandLine::Run() {
+  if (files_.empty()) {
+    files_ = {estimate_, reference_};
+  }
+  chosen_();
+}
 
 std::vector<EvaluationInput> CommandLine::ReadInputs() const {
   if (files_.size() % 2 != 0) {
@@ -136,6 +146,7 @@ std::vector<EvaluationInput> CommandLine::ReadInputs() const {
                       std::move(estimate.trajectory), std::move(reference.trajectory),
                       estimate.has_rotations && reference.has_rotations});
     Warn(warnings);
+    Warn(SwappedWarnings(inputs.back()));
   }
   return inputs;
 }

@@ -58,6 +58,15 @@ std::string Associated(const std::string& name, size_t associated, size_t poses)
       100 * kMinAssociatedShare, span(input.estimate), span(input.reference)));
 }
 
+// Poses a second; 0 if that is unknown.
+double RateOf(const Trajectory& trajectory) {
+  const int64_t span_us =
+      trajectory.empty() ? 0 : trajectory.back().utime - trajectory.front().utime;
+  return span_us > 0
+             ? 1e6 * static_cast<double>(trajectory.size() - 1) / static_cast<double>(span_us)
+             : 0;
+}
+
 // Throws std::runtime_error if too few poses have ground truth.
 std::vector<PosePair> PairsOf(const EvaluationInput& input, double max_gap_s) {
   std::vector<PosePair> pairs =
@@ -116,6 +125,17 @@ ordered_json RowsJson(const std::vector<RelativeRow>& rows, const std::string& l
 }
 
 }  // namespace
+
+std::vector<std::string> SwappedWarnings(const EvaluationInput& input) {
+  const double estimate = RateOf(input.estimate), reference = RateOf(input.reference);
+  if (!(reference > 0) || 2 * reference > estimate) {
+    return {};
+  }
+  return {fmt::format(
+      "{}: it has {:.1f} poses a second, its reference only {:.1f}: are the two swapped? The "
+      "order is ESTIMATE, then REFERENCE (the ground truth)",
+      input.name, estimate, reference)};
+}
 
 AbsoluteEvaluation EvaluateAbsolute(const std::vector<EvaluationInput>& inputs, double max_gap_s) {
   AbsoluteEvaluation evaluation;

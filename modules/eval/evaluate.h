@@ -20,6 +20,10 @@ struct EvaluationInput {
   bool has_rotations = true;  // false: one of the two has positions alone
 };
 
+// A hint if the two are probably swapped: ground truth usually has more poses a second than an
+// estimate, and this reference has less than half as many as its estimate. Else empty.
+std::vector<std::string> SwappedWarnings(const EvaluationInput& input);
+
 // Fewer associated poses are taken as a mistake (such as a different clock); their error would be
 // meaningless.
 inline constexpr size_t kMinAssociated = 10;

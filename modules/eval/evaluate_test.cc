@@ -6,6 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <utility>
 
 #include "eval/table.h"
 
@@ -13,7 +14,9 @@ namespace pangea {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 using ::testing::ThrowsMessage;
 
 EvaluationInput Input(const std::string& name, double offset_m) {
@@ -65,6 +68,24 @@ TEST(Evaluate, PositionsAloneHaveAnAteAndNoRotationError) {
   EXPECT_THAT([&] { EvaluateRelative(positions, {1}, {1}, 0.1); },
               ThrowsMessage<std::runtime_error>(HasSubstr("positions.txt: it or its reference has "
                                                           "positions alone")));
+}
+
+TEST(Evaluate, TwoThatAreProbablySwappedAreNamed) {
+  EvaluationInput input = Input("truth.csv", 0);
+  EXPECT_THAT(SwappedWarnings(input), IsEmpty());
+  Trajectory thin;
+  for (size_t i = 0; i < input.estimate.size(); i += 10) {
+    thin.push_back(input.estimate[i]);
+  }
+  std::swap(input.estimate, thin);
+  EXPECT_THAT(SwappedWarnings(input), IsEmpty()) << "keyframes and their ground truth";
+  std::swap(input.estimate, thin);
+  input.reference = thin;
+  EXPECT_THAT(SwappedWarnings(input),
+              ElementsAre(HasSubstr("truth.csv: it has 20.0 poses a second, its reference only "
+                                    "2.0: are the two swapped?")));
+  input.reference.clear();
+  EXPECT_THAT(SwappedWarnings(input), IsEmpty());
 }
 
 TEST(Evaluate, NoCommonTimeIsAnError) {

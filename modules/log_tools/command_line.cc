@@ -325,9 +325,9 @@ int RunCommandLine(int argc, char** argv) {
   AddVersion(app);
   app.require_subcommand(1);
   app.footer(
-      "Exit code: 0; 1 when something could not be done; 2 when logs differ; 3 when something of a "
-      "log is lost (it is damaged, or ends in the middle of an event): then all is of what could "
-      "be read; above 100 for a wrong command line.");
+      "Exit code: 0; 1 when something could not be done; 2 when logs differ; 3 when a log is "
+      "damaged or ends in the middle of an event: the results are of the part that could be read; "
+      "above 100 for a wrong command line.");
   Arguments arguments;
   AddCommands(app, &arguments);
   const int failed = RunSubcommand(app, argc, argv);

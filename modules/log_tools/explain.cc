@@ -127,7 +127,7 @@ std::string MeasuredText(const LoopVerificationReport& report) {
   std::string text;
   std::string_view step;
   for (const Measurement& m : report.measured) {
-    text += fmt::format("{:31}  {:25}  {:>8.4g}  at {} {:.4g}\n", m.step == step ? "" : m.step,
+    text += fmt::format("{:31}  {:26}  {:>8.4g}  at {} {:.4g}\n", m.step == step ? "" : m.step,
                         m.option, m.value, m.at_least ? "least" : "most ", m.limit);
     step = m.step;
   }

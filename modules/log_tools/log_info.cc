@@ -125,7 +125,7 @@ std::string ToText(const LogSummary& summary, const std::string& log) {
     text += DescribeLoss(summary.reading) + "\n";
   }
   if (summary.reading.checksums > 0) {
-    text += fmt::format("its writer checks it: {} lists of checksums (CHECKSUMS)\n",
+    text += fmt::format("with checksums of its events, in {} messages on CHECKSUMS\n",
                         summary.reading.checksums);
   }
   text += ChannelTable(summary);

@@ -11,6 +11,7 @@
 
 #include "core/median.h"
 #include "files/csv.h"
+#include "files/make_folder.h"
 #include "files/text_file.h"
 #include "recording/euroc_calibration.h"
 #include "recording/grey_image.h"
@@ -360,6 +361,31 @@ std::optional<int64_t> FirstImageUtimeOf(const std::string& folder) {
   const int64_t middle = Median(utimes);
   std::erase_if(utimes, [middle](int64_t utime) { return IsFar(utime, middle); });
   return *std::min_element(utimes.begin(), utimes.end());
+}
+
+std::optional<fs::path> FindRecording(const fs::path& wanted) {
+  const auto is_recording = [](const fs::path& folder) {
+    return fs::is_directory(folder / "mav0") || fs::is_directory(folder / "cam0");
+  };
+  if (is_recording(wanted)) {
+    return wanted;
+  }
+  const fs::path name = WithoutSlash(wanted);
+  const fs::path beside = name.has_parent_path() ? name.parent_path() : ".";
+  const std::string prefix = name.filename().string() + "_";
+  if (!fs::is_directory(beside)) {
+    return std::nullopt;
+  }
+  std::optional<fs::path> found;
+  for (const auto& entry : fs::directory_iterator(beside)) {
+    if (entry.path().filename().string().starts_with(prefix) && is_recording(entry.path())) {
+      if (found) {
+        return std::nullopt;
+      }
+      found = entry.path();
+    }
+  }
+  return found;
 }
 
 Trajectory ReadEurocGroundTruthOf(const std::string& folder, std::vector<std::string>* warnings) {

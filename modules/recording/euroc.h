@@ -9,6 +9,7 @@
 // lists the faults and the optional keys of sensor.yaml.
 
 #include <cstdint>
+#include <filesystem>
 #include <opencv2/core/mat.hpp>
 #include <optional>
 #include <string>
@@ -65,6 +66,10 @@ class EurocRecording {
   Trajectory ground_truth_;
   std::vector<std::string> warnings_;
 };
+
+// The recording's folder: `wanted`, or the only recording beside it whose name continues it (MH_01
+// finds MH_01_easy). Nothing if there is none, or more than one.
+std::optional<std::filesystem::path> FindRecording(const std::filesystem::path& wanted);
 
 // Reads only the ground truth; empty when the recording has none.
 Trajectory ReadEurocGroundTruthOf(const std::string& folder, std::vector<std::string>* warnings);

@@ -158,6 +158,26 @@ TEST_F(EurocTest, WhatElseSomebodyMayGiveIsNamed) {
   }
 }
 
+TEST_F(EurocTest, ANameFindsTheOnlyRecordingThatContinuesIt) {
+  const fs::path outer = root_ + "_outer";
+  fs::remove_all(outer);
+  fs::create_directories(outer / "MH_01_notes");
+  fs::create_directories(outer / "MH_010" / "mav0");
+  fs::rename(root_, outer / "MH_01_easy");
+  root_ = outer;
+  EXPECT_EQ(FindRecording(outer / "MH_01"), outer / "MH_01_easy");
+  EXPECT_EQ(FindRecording(outer / "MH_01" / ""), outer / "MH_01_easy");
+  EXPECT_EQ(FindRecording(outer / "MH_01_easy"), outer / "MH_01_easy");
+  EXPECT_EQ(FindRecording(outer / "MH_01_easy" / "mav0"), outer / "MH_01_easy" / "mav0");
+  EXPECT_EQ(FindRecording(outer / "MH_02"), std::nullopt);
+  const fs::path here = fs::current_path();
+  fs::current_path(outer);
+  EXPECT_EQ(FindRecording("MH_01"), fs::path("./MH_01_easy"));
+  fs::current_path(here);
+  fs::create_directories(outer / "MH_01_again" / "mav0");
+  EXPECT_EQ(FindRecording(outer / "MH_01"), std::nullopt) << "which of the two?";
+}
+
 TEST_F(EurocTest, ImagesWithoutAStampAreCounted) {
   Write("cam0/data.csv", ImageRow(0) + ImageRow(1) + ImageRow(3));
   const EurocRecording recording(root_);

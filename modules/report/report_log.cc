@@ -1,5 +1,7 @@
 #include "report/report_log.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -74,7 +76,10 @@ void AddPose(Bytes data, PoseTrack* track) {
     return;
   }
   track->first_utime = std::min(track->first_utime.value_or(message.utime), message.utime);
-  if (message.state != pose_t::STATE_TRACKING) {
+  const bool tracks = message.state == pose_t::STATE_TRACKING;
+  track->images += tracks || track->images > 0 ? 1 : 0;
+  track->poses += tracks ? 1 : 0;
+  if (!tracks) {
     return;
   }
   const auto map = Parse(message.map);
@@ -235,6 +240,7 @@ PoseTrack ReadPoses(const std::string& path, int32_t agent_id, LogReadings* read
   const std::string poses = channels::Pose(agent_id);
   const std::string keyframes = channels::Keyframe(agent_id);
   const std::string corrections = channels::Correction(agent_id);
+  const std::string odometry = fmt::format("vio_{}", agent_id);
   const auto add = [&](const LogEvent& event) {
     anchors.Add(event);
     if (event.channel == poses) {
@@ -247,6 +253,9 @@ PoseTrack ReadPoses(const std::string& path, int32_t agent_id, LogReadings* read
       status_t status{};
       if (DecodeMessage(event.data, &status)) {
         AddSample(status, event.utime, &track.samples);
+        if (status.process == odometry) {
+          track.images_dropped = CounterOf(status, "images_dropped").value_or(track.images_dropped);
+        }
       }
     }
   };

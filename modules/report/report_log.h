@@ -56,6 +56,9 @@ using ProcessSamples = std::map<std::string, std::vector<ProcessSample>>;  // by
 struct PoseTrack {
   std::optional<int64_t> first_utime;  // first pose message, whatever its state
   std::optional<int64_t> first_tracking_utime;
+  int64_t images = 0;                    // pose messages from the first one that tracks
+  int64_t poses = 0;                     // those of them that track
+  int64_t images_dropped = 0;            // by an odometry that was too slow: without a pose message
   std::set<MapId> maps;                  // of its poses and keyframes
   std::map<MapId, Trajectory> odometry;  // T_odom_body while tracking
   std::vector<LivePose> live;            // while tracking, ascending in time

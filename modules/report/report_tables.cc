@@ -43,7 +43,7 @@ void AddTruth(const char* name, const ConstraintsTruth& truth, Table* table) {
 
 Table AgentTable(const ReportMetrics& metrics) {
   Table table({"agent", "maps", "keyframes", "initialised s", "path m", "ATE VIO m", "ATE server m",
-               "coverage", "counts", "up kB/s", "down kB", "realtime"});
+               "coverage", "ATE valid", "up kB/s", "down kB", "realtime"});
   for (const AgentMetrics& agent : metrics.agents) {
     const AgentRun& run = agent.run;
     table.Add({fmt::format("{}", agent.id), fmt::format("{}", agent.maps.size()),

@@ -23,6 +23,10 @@ Table TrafficTable(const ReportMetrics& metrics);  // on the link, compared with
 
 inline constexpr const char* kLostExplained =
     "Not all of the logs could be read; this is what the rest of them says.";
+inline constexpr const char* kAteExplained =
+    "ATE: RMSE of positions after SE(3) alignment without scale. It is valid (comparable with "
+    "other "
+    "results) if the coverage is at least 0.95 and the agent made one map of its recording.";
 inline constexpr const char* kAnchorsExplained =
     "Error: median distance between where the agent shows it and where ground truth has it, from "
     "10 s after the fusion on; pixels at 640 wide, where it is in the image. Jump: the largest "

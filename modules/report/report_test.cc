@@ -9,7 +9,10 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "messages/channels.h"
 #include "messages/messages.h"
+#include "pangea/pose_t.hpp"
+#include "pangea/status_t.hpp"
 #include "report/report_test_world.h"
 
 namespace pangea {
@@ -17,6 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
+using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
@@ -178,6 +182,36 @@ TEST_F(ReportTest, OnlyThePlayedPartOfTheGroundTruthCounts) {
   const json report = Report();
   EXPECT_EQ(report["agents"][0]["coverage"], 1.0);
   EXPECT_NEAR(report["agents"][0]["initialised_s"].get<double>(), 2, 1e-6);
+}
+
+TEST_F(ReportTest, FewPosesAreNoted) {
+  LogBoth();
+  input_.agents[0].bus_log = folder_ + "/lost.lcm";
+  {
+    LogWriter log(input_.agents[0].bus_log);
+    for (int i = 0; i < 130; ++i) {  // the start is not counted
+      pose_t pose{};
+      pose.utime = Utime(0.1 * i);
+      pose.state = i < 30   ? pose_t::STATE_INITIALISING
+                   : i < 85 ? pose_t::STATE_TRACKING
+                            : pose_t::STATE_LOST;
+      pose.map = ToMessage(Map(1));
+      pose.T_odom_body = pose.T_map_body = ToMessage(Odometry(1, 0.1 * i));
+      log.Write(channels::Pose(1), pose);
+    }
+    status_t status{};
+    status.process = "vio_1";
+    status.counters = {{"images_dropped", 10}};
+    status.num_counters = 1;
+    log.Write(channels::Status(status.process), status);
+  }
+  const json notes = Report()["notes"];
+  EXPECT_THAT(notes, Contains(HasSubstr("agent 1: few poses: 55 of its 110 images after the start "
+                                        "have one (50 %)")));
+  EXPECT_THAT(notes.dump(), HasSubstr("10 were dropped"));
+  EXPECT_THAT(notes.dump(), Not(HasSubstr("agent 2: few poses")));
+  EXPECT_THAT(markdown_, HasSubstr("few poses: 55 of its 110 images"));
+  EXPECT_THAT(Text("report.html"), HasSubstr("few poses: 55 of its 110 images"));
 }
 
 // As `start` and an anchor's `at` count it.

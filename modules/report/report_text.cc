@@ -14,11 +14,7 @@ std::string ReportMarkdown(const ReportInput& input, const CapturedSession& sess
   if (!metrics.lost.empty()) {
     text += fmt::format("**{}**\n\n- {}\n\n", kLostExplained, fmt::join(metrics.lost, "\n- "));
   }
-  text += fmt::format(
-      "{}\n"
-      "ATE: RMSE of positions after SE(3) alignment without scale; it counts with coverage of at "
-      "least 0.95 and one map.\n",
-      AgentTable(metrics).Text());
+  text += fmt::format("{}\n{}\n", AgentTable(metrics).Text(), kAteExplained);
   if (const Table links = LinksTable(metrics); !links.empty()) {
     text += fmt::format("\n{}\nDelivered counts doubled packets twice.\n", links.Text());
   }

@@ -18,6 +18,7 @@
 #include "options/nearest_word.h"
 #include "processes/child_process.h"
 #include "processes/kept_processes.h"
+#include "server/agent_lines.h"
 #include "server/checkpoints.h"
 #include "server/server_processes.h"
 
@@ -169,6 +170,7 @@ Commands ServerCommands(const ServerSetup& options, Checkpoints* checkpoints) {
 std::vector<std::string> ServeOnce(const ServerSetup& options, const Commands& commands,
                                    const std::function<bool(KeptProcesses&)>& continues) {
   KeptProcesses kept(options.logs);
+  AgentLines agents(options.logs / "agent_handler.txt");
   // The bridge starts first and ends last: only then may another host take the site.
   if (!options.cluster.nats.empty()) {
     Start(&kept, kBridge, BridgeCommand(BridgeRole::kCore, options.cluster, options.bus));
@@ -183,7 +185,12 @@ std::vector<std::string> ServeOnce(const ServerSetup& options, const Commands& c
     Start(&kept, kGateway, GatewayCommand(options));
   }
   Say(fmt::format("what they say is in {}; Ctrl-C ends them", fs::absolute(options.logs).string()));
-  return KeepAlive(&kept, [&] { return continues(kept); });
+  return KeepAlive(&kept, [&] {
+    for (const std::string& line : agents.Take()) {
+      Say(line);
+    }
+    return continues(kept);
+  });
 }
 
 // A core's bridge ends by itself, without an error, when another host has the site.
@@ -257,7 +264,7 @@ int Serve(const ServerSetup& options) {
                       process));
     }
   }
-  Say("brings the checkpoints up to date; another Ctrl-C leaves them as they are");
+  Say("writes the checkpoints, so that the next start is quick; press Ctrl-C again to skip this");
   checkpoints.Finish();
   Say("ended");
   return given_up.empty() ? 0 : 1;

@@ -12,9 +12,8 @@ int RunCommandLine(int argc, char** argv) {
   app.require_subcommand(1);
   app.footer(
       "Exit code: 0; 1 when something could not be done; 2 when an expectation of the session file "
-      "was missed or logs differ; 3 when something of a log is lost (it is damaged, or ends in the "
-      "middle of an event): then all is of what could be read; above 100 for a wrong command "
-      "line.");
+      "was missed or logs differ; 3 when a log is damaged or ends in the middle of an event: the "
+      "results are of the part that could be read; above 100 for a wrong command line.");
   CommandResult result;
   AddRunCommand(app, &result);
   AddListCommand(app);

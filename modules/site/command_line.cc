@@ -269,8 +269,8 @@ int RunCommandLine(int argc, char** argv) {
   AddVersion(app);
   app.require_subcommand(1);
   app.footer(
-      "Exit code: 0; 1 when something could not be done; 3 when something of a journal is lost (it "
-      "is damaged): then all is of what could be read; above 100 for a wrong command line.");
+      "Exit code: 0; 1 when something could not be done; 3 when a journal is damaged: the results "
+      "are of the part that could be read; above 100 for a wrong command line.");
   LogReadings readings;
   bool lost = false;
   AddCommands(app, &readings, &lost);

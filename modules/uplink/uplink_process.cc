@@ -20,6 +20,8 @@ namespace pangea {
 namespace {
 
 constexpr int64_t kHaveInterval_us = 400'000;
+// Time for the first answer; later its lack is told, with the likely reasons.
+constexpr int64_t kFirstAnswer_us = 5'000'000;
 constexpr int kStoredAtOnce = 50;  // keyframes that the disk refused before
 // Waits for the next Poll. A message ends them, so between keyframes only the hellos matter.
 constexpr int kBusy_ms = 4;
@@ -265,6 +267,7 @@ int64_t UplinkProcess::Send(const LinkPacket& packet) {
 
 int UplinkProcess::Poll(int64_t steady_us) {
   now_us_ = steady_us;
+  started_us_ = started_us_.value_or(steady_us);
   for (const LinkPacket& packet : uplink_.Poll(steady_us)) {
     Send(packet);
   }
@@ -388,11 +391,14 @@ std::string UplinkProcess::StateForPeople() {
     was_connected_ = true;
     return "connected";
   }
-  return was_connected_ ? "handler is away"
-                        : fmt::format(
-                              "no answer yet: the handler is away, or its key for agent {} "
-                              "is not ours",
-                              agent_id_);
+  if (was_connected_) {
+    return "handler is away";
+  }
+  if (now_us_ - started_us_.value_or(now_us_) < kFirstAnswer_us) {
+    return "connecting";
+  }
+  return fmt::format("no answer yet: the handler is away, or its key for agent {} is not ours",
+                     agent_id_);
 }
 
 std::string UplinkProcess::SpoolForPeople() const {

@@ -64,6 +64,7 @@ class UplinkProcess : public PolledProcess {
   Uplink uplink_;
   UplinkAnchors anchors_;
   std::optional<RateLadder> ladder_;
+  std::optional<int64_t> started_us_;  // the first Poll
   bool was_connected_ = false;
   int64_t bytes_up_ = 0;
   int64_t bytes_up_at_status_ = 0;

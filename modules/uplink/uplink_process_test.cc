@@ -45,6 +45,28 @@ TEST(UplinkProcess, AServerOnTheAgentsBusIsNamed) {
   EXPECT_EQ(RefusedBeside("vio_1"), "");
 }
 
+// An answer takes a moment; only its lack is worth a reason.
+TEST(UplinkProcess, SaysOnlyAfterSecondsThatNobodyAnswers) {
+  LocalBus agent_bus, link_bus;
+  UplinkProcess uplink(agent_bus, link_bus, 7, SecretKey::Random(), UplinkOptions{});
+  std::string summary;
+  agent_bus.Subscribe(channels::Status("uplink_7"), [&](const std::string&, Bytes data) {
+    status_t status{};
+    ASSERT_TRUE(DecodeMessage(data, &status));
+    summary = status.summary;
+  });
+  const auto summary_at = [&](int64_t seconds) {
+    uplink.Poll(100'000'000 + seconds * 1'000'000);
+    uplink.Tick(seconds * 1'000'000);
+    agent_bus.Drain();
+    return summary;
+  };
+  EXPECT_THAT(summary_at(0), testing::StartsWith("connecting, "));
+  EXPECT_THAT(summary_at(4), testing::StartsWith("connecting, "));
+  EXPECT_THAT(summary_at(6), testing::StartsWith("no answer yet: the handler is away, or its key "
+                                                 "for agent 7 is not ours, "));
+}
+
 TEST(UplinkProcess, TellsWhatWasSentAndWhatIsLeft) {
   LocalBus agent_bus, link_bus;
   const std::string folder = testing::TempDir() + "uplink_totals";

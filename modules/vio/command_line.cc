@@ -45,7 +45,8 @@ class NoBus : public Bus {
 void AddArguments(CLI::App& app, Arguments& a) {
   app.add_option("--agent", a.process.agent_id, "agent id")->check(CLI::Range(1, 65535));
   app.add_option("--bus", a.bus, "LCM URL of the agent's bus, or none")->capture_default_str();
-  app.add_option("--recording", a.recording, "folder in EuRoC's format: plays it");
+  app.add_option("--recording", a.recording,
+                 "folder in EuRoC's format: plays it; MH_01 finds MH_01_easy");
   app.add_flag("--live", a.live, "images and samples from IMU_k, IMAGE_k, CAMERA_k");
   app.add_option("--start", a.playback.start_s, "seconds of the recording to skip")
       ->check(NotNegative());
@@ -87,7 +88,11 @@ int Outcome(const VioProcess& process) {
 int Run(const Arguments& a, const LiveImuNoise& live_imu, const std::string& options_source) {
   std::optional<EurocRecording> recording;
   if (!a.live) {
-    recording.emplace(a.recording);
+    const std::string folder = FindRecording(a.recording).value_or(a.recording).string();
+    if (folder != a.recording) {
+      std::cerr << fmt::format("pangea-vio: plays {}\n", folder);
+    }
+    recording.emplace(folder);
     for (const std::string& warning : recording->warnings()) {
       std::cerr << fmt::format("pangea-vio: {}\n", warning);
     }

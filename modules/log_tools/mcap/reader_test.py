@@ -138,8 +138,9 @@ def main():
     channels = "(POSE_.*|MAP_STATE|CONSTRAINT|KEYFRAME_1)"
     with tempfile.TemporaryDirectory() as folder:
         out = os.path.join(folder, "session.mcap")
-        subprocess.run([to_mcap, log, out, channels], check=True, stdout=subprocess.DEVNULL,
-                       env={**os.environ, "PANGEA_LOG": pangea_log})
+        run = subprocess.run([to_mcap, log, out, channels], check=True, capture_output=True, text=True,
+                             env={**os.environ, "PANGEA_LOG": pangea_log})
+        assert f"mcap: converts the messages of {log}\n" in run.stderr, "it says what it does"
         with open(out, "rb") as file:
             mcap = File(file.read())
 

@@ -21,7 +21,7 @@ double PositionSigma(const Matrix6d& covariance) {
 // or wrong: it was searched near its predicted position, so whatever was found there fits. So in
 // the worst direction no landmark may contribute more information than all others together.
 bool OneSaysMost(Verification* v) {
-  return !v->AtMost("sigma without one", PositionSigma(v->ba->covariance_without_one),
+  return !v->AtMost("sigma_m without 1 landmark", PositionSigma(v->ba->covariance_without_one),
                     std::numbers::sqrt2 * PositionSigma(v->ba->covariance));
 }
 
@@ -31,8 +31,8 @@ bool OneSaysMost(Verification* v) {
 bool HangsOnVagueMatches(Verification* v, double max_sigma_m) {
   constexpr double kNotFixed_m = 1e3;
   const auto& covariance = v->ba->covariance_of_sure;
-  return !v->AtMost("max_sigma_m of sure", covariance ? PositionSigma(*covariance) : kNotFixed_m,
-                    max_sigma_m);
+  return !v->AtMost("max_sigma_m, sure matches",
+                    covariance ? PositionSigma(*covariance) : kNotFixed_m, max_sigma_m);
 }
 
 // Number of distinct inlier landmarks, and of the image cells that they occupy in one of the two

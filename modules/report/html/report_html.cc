@@ -226,10 +226,7 @@ std::string ReportHtml(const ReportInput& input, const CapturedSession& session,
     html += Paragraph(kLostExplained) + List(metrics.lost);
   }
   html += Tiles(session, metrics);
-  html += Section("agents", "Agents",
-                  AgentTable(metrics).Html() +
-                      Aside("ATE: RMSE of positions after SE(3) alignment without scale; it counts "
-                            "with coverage of at least 0.95 and one map."));
+  html += Section("agents", "Agents", AgentTable(metrics).Html() + Aside(kAteExplained));
   html += Section("trajectories", "Trajectories", Trajectories(pictures));
   std::string error = ChartOr(pictures.back().plot, "Position error over time",
                               "No ground truth is known, so no error.");

@@ -15,6 +15,9 @@
 namespace pangea {
 namespace {
 
+// Share of the images after the start. With fewer poses the report has a note.
+constexpr double kFewPosesShare = 0.9;
+
 std::map<int32_t, AgentRun> Runs(const ReportInput& input, const CapturedSession& session) {
   std::map<int32_t, AgentRun> runs;
   for (const AgentRun& run : input.agents) {
@@ -77,6 +80,23 @@ std::map<MapId, int64_t> FusedRevisions(const CapturedSession& session) {
   return revisions;
 }
 
+void NoteFewPoses(const PoseTrack& track, int32_t agent_id, std::vector<std::string>* notes) {
+  const int64_t images = track.images + track.images_dropped;
+  const double share = static_cast<double>(track.poses) / static_cast<double>(images);
+  if (track.poses == 0 || share >= kFewPosesShare) {
+    return;
+  }
+  std::string note = fmt::format(
+      "agent {}: few poses: {} of its {} images after the start have one ({:.0f} %); "
+      "POSE_{}.reason says why the others have none",
+      agent_id, track.poses, images, 100 * share, agent_id);
+  if (track.images_dropped > 0) {
+    note += fmt::format("; {} were dropped, as the odometry was too slow for real time",
+                        track.images_dropped);
+  }
+  notes->push_back(std::move(note));
+}
+
 // All maps of the agent, also those of earlier sessions.
 std::set<MapId> MapsOf(const AgentMetrics& agent, const MapSpans& spans) {
   std::set<MapId> maps;
@@ -98,6 +118,7 @@ void ReadOdometry(const CapturedSession& session, const MapSpans& spans, AgentMe
   if (!run.bus_log.empty() && std::filesystem::exists(run.bus_log)) {
     track = ReadPoses(run.bus_log, run.id, readings);
     run.maps = std::move(track.maps);  // nothing else publishes on the agent's bus
+    NoteFewPoses(track, run.id, notes);
   }
   agent->odometry = std::move(track.odometry);
   agent->samples = std::move(track.samples);

@@ -11,6 +11,7 @@
 #include "core/text/control_characters.h"
 #include "options/nearest_word.h"
 #include "options/yaml_options.h"
+#include "recording/euroc.h"
 #include "server/server_processes.h"
 
 namespace pangea::session {
@@ -21,31 +22,6 @@ namespace fs = std::filesystem;
 constexpr int32_t kMaxAgentId = 65535;
 constexpr double kMaxTime_s = 1e6;  // eleven days
 constexpr double kMaxPixel = 20000;
-
-// A recording is a folder with mav0 in it, or mav0 itself.
-bool IsRecording(const fs::path& folder) {
-  return fs::is_directory(folder / "mav0") || fs::is_directory(folder / "cam0");
-}
-
-// The folder itself, or the only folder whose name continues it (MH_01 -> MH_01_easy).
-std::optional<fs::path> FindRecording(const fs::path& wanted) {
-  if (IsRecording(wanted)) {
-    return wanted;
-  }
-  std::optional<fs::path> found;
-  const std::string prefix = wanted.filename().string() + "_";
-  if (fs::is_directory(wanted.parent_path())) {
-    for (const auto& entry : fs::directory_iterator(wanted.parent_path())) {
-      if (entry.path().filename().string().starts_with(prefix) && IsRecording(entry.path())) {
-        if (found) {
-          return std::nullopt;
-        }
-        found = entry.path();
-      }
-    }
-  }
-  return found;
-}
 
 void CheckAgent(const AgentScript& agent, const std::string& file) {
   if (agent.recording.empty() && agent.keyframes.empty() && !agent.live) {
