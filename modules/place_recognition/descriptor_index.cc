@@ -49,6 +49,7 @@ DescriptorIndex::DescriptorIndex() {
 int DescriptorIndex::Add(const std::vector<Corner>& corners) {
   const int keyframe = size();
   num_corners_.push_back(static_cast<int>(corners.size()));
+  num_postings_ += static_cast<int64_t>(corners.size());
   // First all words, then all lists: the lists are far apart in memory, and the processor fetches
   // several at once.
   std::vector<std::pair<uint32_t, uint32_t>> hashes(corners.size());
@@ -80,15 +81,27 @@ void DescriptorIndex::Save(ByteWriter* writer) {
 
 bool DescriptorIndex::Restore(ByteReader* reader) {
   reader->Get(&num_corners_);
+  num_postings_ = std::accumulate(num_corners_.begin(), num_corners_.end(), int64_t{0});
   return std::ranges::all_of(
       tables_, [&](Table& table) { return table.postings.Restore(reader, num_corners_.size()); });
 }
 
 template <typename Accept, typename Visit>
-void DescriptorIndex::Probe(const std::vector<Corner>& corners, Accept accept, Visit visit) const {
-  std::vector<uint32_t> words(kTables * corners.size());
-  for (size_t i = 0; i < words.size(); ++i) {
-    words[i] = tables_[i % kTables].Word(corners[i / kTables].descriptor);
+void DescriptorIndex::Probe(const std::vector<Corner>& corners, int num_flipped, Accept accept,
+                            Visit visit) const {
+  // For each corner and table: its word, then those with one bit flipped.
+  const size_t num_words = 1 + static_cast<size_t>(num_flipped);
+  const size_t per_corner = kTables * num_words;
+  std::vector<uint32_t> words(per_corner * corners.size());
+  std::vector<uint32_t> signatures(kTables * corners.size());
+  for (size_t i = 0; i < signatures.size(); ++i) {
+    const Table& table = tables_[i % kTables];
+    const Descriptor& descriptor = corners[i / kTables].descriptor;
+    signatures[i] = table.Signature(descriptor);
+    const uint32_t word = table.Word(descriptor);
+    for (size_t probe = 0; probe < num_words; ++probe) {
+      words[i * num_words + probe] = probe == 0 ? word : word ^ (1U << (probe - 1));
+    }
   }
   std::vector<PostingLists::PackedList> lists(words.size());
   // A pipeline: each step works some words behind the previous step, so that the memory it reads
@@ -97,7 +110,7 @@ void DescriptorIndex::Probe(const std::vector<Corner>& corners, Accept accept, V
   for (size_t i = 0; i < words.size() + 3 * kStep; ++i) {
     const auto step = [&](size_t behind, const auto& take) {
       if (const size_t at = i - behind; i >= behind && at < words.size()) {
-        take(at, tables_[at % kTables]);
+        take(at, tables_[at / num_words % kTables]);
       }
     };
     step(0, [&](size_t at, const Table& table) { table.postings.PrefetchBegin(words[at]); });
@@ -107,8 +120,8 @@ void DescriptorIndex::Probe(const std::vector<Corner>& corners, Accept accept, V
       table.postings.PrefetchList(words[at], lists[at]);
     });
     step(3 * kStep, [&](size_t at, const Table& table) {
-      const size_t corner = at / kTables;
-      const uint32_t signature = table.Signature(corners[corner].descriptor);
+      const size_t corner = at / per_corner;
+      const uint32_t signature = signatures[at / num_words];
       // The corner's index selects the phase of the sample.
       table.postings.Sample(
           words[at], lists[at], kMaxPostingsPerWord, corner,
@@ -118,11 +131,25 @@ void DescriptorIndex::Probe(const std::vector<Corner>& corners, Accept accept, V
   }
 }
 
-std::vector<float> DescriptorIndex::Query(const std::vector<Corner>& corners) const {
+DescriptorIndex::Search DescriptorIndex::SearchOf(DescriptorKind kind, size_t num_corners) const {
+  if (kind == DescriptorKind::kOrb) {
+    return {.max_signature_distance = 6, .num_flipped = 0};
+  }
+  // Expected number of postings compared, if only the words themselves are visited.
+  const double postings =
+      static_cast<double>(num_postings_) / kNumWords * kTables * static_cast<double>(num_corners);
+  const double affordable = kMaxExpectedPostings / std::max(1.0, postings) - 1;
+  return {.max_signature_distance = 8,
+          .num_flipped = static_cast<int>(std::clamp<double>(affordable, 0, kWordBits))};
+}
+
+std::vector<float> DescriptorIndex::Query(const std::vector<Corner>& corners,
+                                          DescriptorKind kind) const {
   std::vector<std::vector<int32_t>> met(corners.size());
   std::vector<size_t> last_voter(size(), corners.size());
-  const auto is_similar = [](int distance) { return distance <= kMaxSignatureDistance; };
-  Probe(corners, is_similar, [&](size_t corner, int32_t keyframe) {
+  const Search search = SearchOf(kind, corners.size());
+  const auto is_similar = [&](int distance) { return distance <= search.max_signature_distance; };
+  Probe(corners, search.num_flipped, is_similar, [&](size_t corner, int32_t keyframe) {
     if (last_voter[keyframe] != corner) {
       last_voter[keyframe] = corner;
       met[corner].push_back(keyframe);
@@ -145,7 +172,7 @@ std::vector<float> DescriptorIndex::Query(const std::vector<Corner>& corners) co
 int64_t DescriptorIndex::CountPostings(const std::vector<Corner>& corners) const {
   int64_t count = 0;
   const auto take_all = [](int) { return true; };
-  Probe(corners, take_all, [&](size_t, int32_t) { ++count; });
+  Probe(corners, 0, take_all, [&](size_t, int32_t) { ++count; });
   return count;
 }
 

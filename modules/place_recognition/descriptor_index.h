@@ -6,10 +6,11 @@
 // The words are locality-sensitive hashes: table t's word is a fixed random choice of kWordBits of
 // the descriptor's bits (Indyk & Motwani, STOC 1998). Each posting (a corner of a stored keyframe)
 // carries a signature of 32 other bits, which reveals most chance collisions without the full
-// descriptor (Hamming embedding; Jegou et al., ECCV 2008). A query corner votes once for each
-// keyframe with a similar posting, with the weight log(number of keyframes / number of those), the
-// idf of Sivic & Zisserman. The constants were chosen by measurements:
-// docs/decisions/place_recognition_index.md.
+// descriptor (Hamming embedding; Jegou et al., ECCV 2008). A query also visits the words with one
+// bit flipped (multi-probe hashing; Lv et al., VLDB 2007), as many as a small index can afford; not
+// for ORB, whose results stay as they were. A query corner votes once for each keyframe with a
+// similar posting, with the weight log(number of keyframes / number of those), the idf of Sivic &
+// Zisserman. The constants were chosen by measurements: docs/decisions/place_recognition_index.md.
 //
 // Deterministic; no result depends on time. Memory: 19.5 kB per keyframe of 600 corners, plus about
 // 5 MB (posting_lists.h).
@@ -39,7 +40,8 @@ class DescriptorIndex {
 
   // Returns a score in 0 .. 1 for each keyframe: its votes, divided by those it would have if every
   // query corner met this keyframe and no other.
-  std::vector<float> Query(const std::vector<Corner>& corners) const;
+  std::vector<float> Query(const std::vector<Corner>& corners,
+                           DescriptorKind kind = DescriptorKind::kOrb) const;
 
   // Number of postings that a query compares with; the cost of each is constant.
   int64_t CountPostings(const std::vector<Corner>& corners) const;
@@ -49,7 +51,7 @@ class DescriptorIndex {
   static constexpr int kWordBits = 18;
   static constexpr size_t kNumWords = size_t{1} << kWordBits;
   static constexpr int kSignatureBits = 32;
-  static constexpr int kMaxSignatureDistance = 6;
+  static constexpr double kMaxExpectedPostings = 1e6;  // compared by a query, about 5 ms
   // If a word has more postings than this (a place seen thousands of times), a query compares with
   // an evenly spaced sample of about this many. This bounds its time without forgetting the place.
   static constexpr size_t kMaxPostingsPerWord = 128;
@@ -69,13 +71,19 @@ class DescriptorIndex {
     uint32_t Word(const Descriptor& descriptor) const;
     uint32_t Signature(const Descriptor& descriptor) const;
   };
+  struct Search {
+    int max_signature_distance;
+    int num_flipped;  // words with one bit flipped, for each corner and table
+  };
+  Search SearchOf(DescriptorKind kind, size_t num_corners) const;
   // Calls visit(corner, keyframe) for each posting with the corner's word and accept(distance of
   // the signatures), corner by corner.
   template <typename Accept, typename Visit>
-  void Probe(const std::vector<Corner>& corners, Accept accept, Visit visit) const;
+  void Probe(const std::vector<Corner>& corners, int num_flipped, Accept accept, Visit visit) const;
 
   std::array<Table, kTables> tables_;
   std::vector<int> num_corners_;  // by keyframe
+  int64_t num_postings_ = 0;      // in each table
 };
 
 }  // namespace pangea

@@ -28,6 +28,19 @@ TEST(DescriptorIndex, TheSamePlaceScoresHighest) {
   }
 }
 
+// Of the network's descriptors more pairs with many different bits are found.
+TEST(DescriptorIndex, TheNetworksDescriptorsAreSearchedMoreWidely) {
+  test::TestWorld world(1, {.flipped_bits = 35});
+  DescriptorIndex index;
+  index.Add(world.See({kMap, 0}, {0, 0, 1.5}, 0).corners);
+  index.Add(world.See({kMap, 1}, {0, 0, 1.5}, 2).corners);
+  const auto query = world.See({kMap, 100}, {0, 0, 1.5}, 0).corners;
+  const auto as_orb = index.Query(query, DescriptorKind::kOrb);
+  const auto as_network = index.Query(query, DescriptorKind::kPatchNetwork);
+  EXPECT_GT(as_network[0], 3 * as_orb[0]);
+  EXPECT_GT(as_network[0], 10 * as_network[1]);
+}
+
 TEST(DescriptorIndex, AnotherWorldScoresNearNothing) {
   test::TestWorld world(1);
   test::TestWorld other(2);

@@ -28,7 +28,7 @@ PlaceMatch PlaceRecognition::Add(const Keyframe& keyframe, std::vector<PlaceRepo
   PlaceMatch match;
   match.query = query.id;
 
-  const std::vector<float> scores = index_.Query(query.corners);
+  const std::vector<float> scores = index_.Query(query.corners, query.descriptor_kind);
   std::vector<Place> own;
   std::vector<Place> others;
   for (int i = 0; i < static_cast<int>(scores.size()); ++i) {

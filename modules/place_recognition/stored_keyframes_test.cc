@@ -56,6 +56,7 @@ TEST(StoredKeyframes, APlaceThatNoRecordHasIsRefused) {
     ByteRecordWriter writer;
     writer.PutCount(1);
     writer.Put(KeyframeId{{1, 1000}, 0});
+    writer.Put(DescriptorKind::kOrb);
     AscendingNumbers().Save(&writer);
     writer.Put(offset);
     writer.Put(size);

@@ -32,7 +32,7 @@ struct DescriberOptions {
   void Visit(Archive& archive) {
     archive.AddChoice("descriptor", &descriptor,
                       {{"orb", DescriptorKind::kOrb}, {"network", DescriptorKind::kPatchNetwork}},
-                      "of corners; `orb` to be recognised in maps of versions before 0.3");
+                      "of corners; orb to be recognised in maps made with it");
     archive.Add("max_blobs", &max_blobs, {0, kMaxCorners}, "",
                 "of a keyframe's corners, beside landmarks");
   }

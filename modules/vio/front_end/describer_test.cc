@@ -85,12 +85,12 @@ TEST(Describer, CoversTheImageAndSeveralOctaves) {
 
 // Matches two views by mutual nearest neighbours; returns the share within 3 px of the truth.
 double CorrectShare(const cv::Mat& a, const cv::Mat& b, const Eigen::Quaterniond& q_b_a,
-                    int* matches) {
-  Describer describer(PlainCamera(), {});
+                    DescriptorKind kind, int* matches) {
+  Describer describer(PlainCamera(), {.descriptor = kind});
   const std::vector<Corner> corners_a = describer.Describe(a, Tracks(a), kUpright);
-  const std::vector<Corner> corners_b = describer.Describe(b, Tracks(b), kUpright);
+  const std::vector<Corner> corners_b = describer.Describe(b, Tracks(b), q_b_a * kUpright);
   int correct = 0;
-  const auto found = MatchCorners(corners_a, corners_b, {});
+  const auto found = MatchCorners(corners_a, corners_b, {.max_distance = LimitsOf(kind).alike});
   for (const CornerMatch& match : found) {
     const CameraModel camera = PlainCamera();
     const auto ray = camera.Unproject(corners_a[match.a].pixel.cast<double>());
@@ -106,9 +106,12 @@ double CorrectShare(const cv::Mat& a, const cv::Mat& b, const Eigen::Quaterniond
 TEST(Describer, DescriptorsSurviveARollOfThirtyDegrees) {
   const cv::Mat image = RandomTexture(752, 480, 3);
   const Eigen::Quaterniond roll = ExpSo3({0, 0, 0.52});
-  int matches = 0;
-  EXPECT_GT(CorrectShare(image, RotatedView(image, PlainCamera(), roll), roll, &matches), 0.9);
-  EXPECT_GT(matches, 120);
+  const cv::Mat rotated = RotatedView(image, PlainCamera(), roll);
+  for (const auto kind : {DescriptorKind::kOrb, DescriptorKind::kPatchNetwork}) {
+    int matches = 0;
+    EXPECT_GT(CorrectShare(image, rotated, roll, kind, &matches), 0.9);
+    EXPECT_GT(matches, 120);
+  }
 }
 
 TEST(Describer, DescriptorsSurviveScaleAndExposure) {

@@ -13,7 +13,7 @@
 namespace pangea::vio {
 namespace {
 
-constexpr int kLanes = 4;          // outputs in a vector
+constexpr int kLanes = 8;          // outputs that are computed together
 constexpr float kLargest = 127.F;  // activation
 
 }  // namespace
