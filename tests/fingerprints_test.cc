@@ -46,6 +46,7 @@ TEST(Fingerprints, ArePinned) {
   EXPECT_EQ(static_cast<uint64_t>(journal_file_t::getHash()), 0x69e928d608c54eeeu);
   EXPECT_EQ(static_cast<uint64_t>(keyframe_t::getHash()), 0x59b338437f11086du);
   EXPECT_EQ(static_cast<uint64_t>(keyframe_2_t::getHash()), 0x1eb6373b1cc1ddb2u);
+  EXPECT_EQ(static_cast<uint64_t>(keyframe_3_t::getHash()), 0x353f3c02c32f26c3u);
   EXPECT_EQ(static_cast<uint64_t>(landmarks_t::getHash()), 0xc37fda84c71fcf58u);
   EXPECT_EQ(static_cast<uint64_t>(map_state_t::getHash()), 0xb735441a70264ce5u);
   EXPECT_EQ(static_cast<uint64_t>(options_t::getHash()), 0x68b9878722173cbcu);
