@@ -25,7 +25,7 @@ PackedWeights::PackedWeights(const std::vector<int8_t>& weights, int outputs, in
     for (int k = 0; k < length; ++k) {
       const int group = output / kLanes, lane = output % kLanes;
       packed_[((static_cast<size_t>(group) * pairs_ + k / 2) * kLanes + lane) * 2 + k % 2] =
-          weights[static_cast<size_t>(output) * length + k];
+          int16_t{weights[static_cast<size_t>(output) * length + k]};
     }
   }
 }

@@ -102,7 +102,8 @@ void Gather(const std::vector<int16_t>& in, int side, int channels, int row, int
       continue;
     }
     std::fill_n(out, channels, int16_t{0});
-    const auto at = static_cast<std::ptrdiff_t>((2 * row + dy) * side + 2 * column + first);
+    const std::ptrdiff_t at =
+        std::ptrdiff_t{2} * column + first + std::ptrdiff_t{side} * (2 * row + dy);
     std::copy_n(in.data() + at * channels, (2 - first) * channels, out + (first + 1) * channels);
   }
 }
