@@ -140,7 +140,7 @@ DescriptorIndex::Search DescriptorIndex::SearchOf(DescriptorKind kind, size_t nu
       static_cast<double>(num_postings_) / kNumWords * kTables * static_cast<double>(num_corners);
   const double affordable = kMaxExpectedPostings / std::max(1.0, postings) - 1;
   return {.max_signature_distance = 8,
-          .num_flipped = static_cast<int>(std::clamp<double>(affordable, 0, kWordBits))};
+          .num_flipped = static_cast<int>(std::clamp<double>(affordable, 0, kMaxFlipped))};
 }
 
 std::vector<float> DescriptorIndex::Query(const std::vector<Corner>& corners,

@@ -52,6 +52,7 @@ class DescriptorIndex {
   static constexpr size_t kNumWords = size_t{1} << kWordBits;
   static constexpr int kSignatureBits = 32;
   static constexpr double kMaxExpectedPostings = 1e6;  // compared by a query, about 5 ms
+  static constexpr int kMaxFlipped = 6;  // bits; each costs as much as the word itself
   // If a word has more postings than this (a place seen thousands of times), a query compares with
   // an evenly spaced sample of about this many. This bounds its time without forgetting the place.
   static constexpr size_t kMaxPostingsPerWord = 128;
