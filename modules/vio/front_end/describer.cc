@@ -8,7 +8,7 @@
 #include <span>
 #include <utility>
 
-#include "vio/front_end/blobs.h"
+#include "vio/front_end/blobs/blobs.h"
 #include "vio/front_end/patch_network.h"
 #include "vio/front_end/patch_sampler.h"
 #include "vio/front_end/spread.h"

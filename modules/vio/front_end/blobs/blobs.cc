@@ -1,10 +1,10 @@
-#include "vio/front_end/blobs.h"
+#include "vio/front_end/blobs/blobs.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "vio/front_end/blob_descriptor.h"
-#include "vio/front_end/scale_space.h"
+#include "vio/front_end/blobs/blob_descriptor.h"
+#include "vio/front_end/blobs/scale_space.h"
 #include "vio/front_end/spread.h"
 
 namespace pangea::vio {

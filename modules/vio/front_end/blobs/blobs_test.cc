@@ -1,4 +1,4 @@
-#include "vio/front_end/blobs.h"
+#include "vio/front_end/blobs/blobs.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include <random>
 
 #include "core/matching.h"
-#include "vio/front_end/blob_descriptor.h"
+#include "vio/front_end/blobs/blob_descriptor.h"
 #include "vio/front_end/spread.h"
 #include "vio/front_end/test_images.h"
 

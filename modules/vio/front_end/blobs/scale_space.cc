@@ -1,4 +1,4 @@
-#include "vio/front_end/scale_space.h"
+#include "vio/front_end/blobs/scale_space.h"
 
 #include <Eigen/Dense>
 #include <algorithm>

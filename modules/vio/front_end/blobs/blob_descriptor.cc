@@ -1,4 +1,4 @@
-#include "vio/front_end/blob_descriptor.h"
+#include "vio/front_end/blobs/blob_descriptor.h"
 
 #include <Eigen/Core>
 #include <algorithm>

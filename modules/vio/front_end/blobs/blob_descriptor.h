@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/keyframe.h"
-#include "vio/front_end/scale_space.h"
+#include "vio/front_end/blobs/scale_space.h"
 
 namespace pangea::vio {
 
