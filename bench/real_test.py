@@ -11,10 +11,11 @@ import sys
 import tempfile
 import unittest
 from pathlib import Path
+from unittest import mock
 
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from real_lib import colmap, constraints, funnel, linked_copy, measure, tables, trajectory  # noqa: E402
+from real_lib import colmap, constraints, cycles, funnel, linked_copy, measure, tables, trajectory  # noqa: E402
 from real_lib import rotations as rot  # noqa: E402
 from real_lib.alignment import centred, largest_eigenvector, rmse  # noqa: E402
 from real_lib.plan import Plan  # noqa: E402
@@ -271,11 +272,47 @@ class FilesTest(unittest.TestCase):
 
         def constraint(identity, good):
             ends = struct.pack(">8xqiqiiqib?", identity, 1, 77, 0, 1, 77, 1, 1, good)
-            return event("CONSTRAINT", ends + struct.pack(">i", 4) + b"why\0" + struct.pack(">7d", 1, 0, 0, 0, 4, 5, 6))
+            return event("CONSTRAINT", ends + struct.pack(">i", 4) + b"why\0" + struct.pack(">43d", 1, 0, 0, 0, 4, 5, 6, *range(36)))
 
         log = self.work / "session.lcm"
         log.write_bytes(keyframe(0, 2_000_000) + keyframe(1, 15_000_000) + constraint(5, True) + constraint(6, False))
-        self.assertEqual(constraints.accepted(log), {(1, 1): [(2.0, 15.0, ((1.0, 0.0, 0.0, 0.0), (4.0, 5.0, 6.0)))]})
+        (found,) = constraints.accepted(log)[(1, 77), (1, 77)]
+        self.assertEqual(found[:3], (2.0, 15.0, ((1.0, 0.0, 0.0, 0.0), (4.0, 5.0, 6.0))))
+        self.assertEqual([tuple(row) for row in found[3]], [tuple(range(row, row + 6)) for row in range(0, 36, 6)])
+
+
+class CyclesTest(unittest.TestCase):
+    SIGMAS = (0.02, 0.04, 0.01, 0.03, 0.01, 0.05)
+
+    def nees(self, count=400, claimed=1.0, apart_s=1.0):
+        """Of pairs of constraints between two odometries, with random errors of SIGMAS."""
+        random.seed(1)
+
+        def pose():
+            return rot.normalised([random.gauss(0, 1) for _ in range(4)]), tuple(random.gauss(0, 1) for _ in range(3))
+
+        def constraint(A, B):
+            error = [random.gauss(0, sigma) for sigma in self.SIGMAS]
+            q, p = rot.between(A, B)
+            small = rot.normalised((1.0, *(0.5 * x for x in error[3:])))
+            return (rot.multiply(small, q), rot.add(p, error[:3]))
+
+        covariance = [[claimed * self.SIGMAS[i] ** 2 * (i == j) for j in range(6)] for i in range(6)]
+        values = []
+        for _ in range(count):
+            poses = {(agent, t): pose() for agent in (1, 2) for t in (0.0, apart_s)}
+            found = [(t, t, constraint(poses[1, t], poses[2, t]), covariance) for t in (0.0, apart_s)]
+            values += cycles.nees({(1, 2): found}, lambda agent, t, u, poses=poses: rot.between(poses[agent, t], poses[agent, u]))
+        return values
+
+    @mock.patch.object(cycles, "DRIFT_M", 0)
+    def test_errors_as_large_as_claimed_give_one(self):
+        self.assertAlmostEqual(cycles.spread(self.nees())["mean"], 1, delta=0.1)
+        self.assertAlmostEqual(cycles.spread(self.nees(claimed=0.25))["mean"], 4, delta=0.6)
+
+    def test_constraints_far_apart_make_no_cycle(self):
+        self.assertEqual(self.nees(2, apart_s=2.5), [])
+        self.assertEqual(cycles.spread([]), {"number": 0, "mean": None, "median": None})
 
 
 class TablesTest(unittest.TestCase):

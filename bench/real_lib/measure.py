@@ -1,5 +1,7 @@
 """Compares a trajectory of camera poses with a reference, which may be in pieces; a scale is the estimate's relative to the reference's."""
 
+import bisect
+import itertools
 import math
 from dataclasses import dataclass
 
@@ -12,6 +14,7 @@ SHIFT_S, SHIFT_STEP_S = 0.1, 0.005  # range of the search, in both directions, a
 REVISIT_APART_S = 10.0
 REVISIT_M, REVISIT_RAD = 1.0, math.radians(45)  # between two camera poses that see the same place
 REVISIT_STEP_S = 0.4  # between the poses that are paired
+STEP_S = 1.0  # of a_second
 WRONG_M, WRONG_RAD = 0.5, math.radians(5)
 ACROSS = 2  # factor on the bounds between pieces, because a reference is less accurate where they join
 
@@ -76,6 +79,7 @@ def measure(estimate, pieces, shift=0.0):
               "drift": second / first if first and second else None, "shift_s": shift, "poses": covered,
               "coverage": covered / max(covered, sum(expected(estimate, piece) for piece in pieces))}
     result["revisits"] = revisits(known, scale)
+    result["a_second"] = a_second(known, scale)
     return result
 
 
@@ -94,18 +98,34 @@ def near(a, b):
 
 def revisits(known, scale):
     """Errors of relative poses of revisited places, in the reference's metres: the odometry's drift where a loop may be closed."""
-    metres, radians = [], []
-    for pairs in same_frame(known):
-        nodes = spaced([(t, e, r) for _, (t, e, r) in pairs])
-        for i, (t, e, r) in enumerate(nodes):
-            for u, f, s in nodes[i + 1:]:
-                if u - t >= REVISIT_APART_S and near(r, s):
-                    metres_off, radians_off = difference(rot.between(e, f), rot.between(r, s), scale)
-                    metres.append(metres_off)
-                    radians.append(radians_off)
-    if not metres:
+    return errors(((a, b) for pairs in same_frame(known) for a, b in itertools.combinations(spaced(plain(pairs)), 2)
+                   if b[0] - a[0] >= REVISIT_APART_S and near(a[2], b[2])), scale)
+
+
+def a_second(known, scale):
+    """Errors of relative poses a second apart. An odometry hardly drifts in a second: for an odometry they tell how accurate the reference is."""
+    def apart():
+        for pairs in same_frame(known):
+            nodes = plain(pairs)
+            stamps = [t for t, _, _ in nodes]
+            for a in nodes:
+                i = bisect.bisect_left(stamps, a[0] + STEP_S)
+                if i < len(nodes) and stamps[i] - a[0] < 1.5 * STEP_S:
+                    yield a, nodes[i]
+    return errors(apart(), scale)
+
+
+def plain(pairs):
+    return [pair for _, pair in pairs]
+
+
+def errors(two_poses, scale):
+    """Medians of the errors of relative poses; each pose is (stamp, estimate, reference)."""
+    off = [difference(rot.between(a[1], b[1]), rot.between(a[2], b[2]), scale) for a, b in two_poses]
+    if not off:
         return {"pairs": 0, "median_m": None, "median_deg": None}
-    return {"pairs": len(metres), "median_m": middle_of(metres), "median_deg": math.degrees(middle_of(radians))}
+    metres, radians = zip(*off)
+    return {"pairs": len(off), "median_m": middle_of(metres), "median_deg": math.degrees(middle_of(radians))}
 
 
 def same_frame(known):
@@ -133,12 +153,12 @@ def middle_of(values):
 
 
 def check_constraints(constraints, pieces, scale, T_body_cam):
-    """Checks the accepted constraints (from stamp, to stamp, T_from_to of the bodies) that the reference covers: checked, wrong, of revisits.
+    """Checks the accepted constraints (from stamp, to stamp, T_from_to of the bodies, ...) that the reference covers: checked, wrong, of revisits.
 
     Wrong within one piece: an error above WRONG_M or WRONG_RAD; between two pieces of one frame: ACROSS times as much."""
     result = {"checked": 0, "wrong": 0, "revisits": 0, "median_m": None, "median_deg": None}
     metres, radians = [], []
-    for t, u, T_from_to in constraints:
+    for t, u, T_from_to, *_ in constraints:
         a, b = (in_pieces(pieces, stamp) for stamp in (t, u))
         result["revisits"] += abs(t - u) >= REVISIT_APART_S
         if not a or not b or a[0].frame != b[0].frame:

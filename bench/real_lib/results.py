@@ -5,6 +5,7 @@ from accuracy_lib.metrics import read_json
 from real_lib import rotations as rot
 from real_lib import trajectory
 from real_lib.constraints import accepted
+from real_lib.cycles import nees, spread
 from real_lib.funnel import covisible, funnel
 from real_lib.measure import best_shift, check_constraints, measure
 
@@ -64,11 +65,18 @@ class Results:
         return result
 
     def _constraints(self, folder, agents, report, scale):
-        found = [c for constraints in accepted(folder / "session.lcm").values() for c in constraints]
+        found = accepted(folder / "session.lcm")
+        odometry = {agent.id: dict(trajectory.read(folder / f"agent_{agent.id}.vio.tum")) for agent in agents}
+
+        def motion(of_map, t, u):
+            ends = [odometry[of_map[0]].get(stamp) for stamp in (t, u)]
+            return None if None in ends else rot.between(*ends)
+
         counts = report["constraints"]
         return {"accepted": counts["accepted"], "refused": counts["refused"], "refused_by_reason": counts["refused_by_reason"],
                 "switched_off": sum(group["constraints_switched_off"] for group in report["groups"]),
-                **check_constraints(found, self.pieces, scale, self.T_body_cam)}
+                "cycles": spread(nees(found, motion)),
+                **check_constraints([c for constraints in found.values() for c in constraints], self.pieces, scale, self.T_body_cam)}
 
     def _measured(self, body_poses, maps):
         result = measure(trajectory.moved(body_poses, self.T_body_cam), self.pieces) if body_poses else None

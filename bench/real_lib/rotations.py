@@ -28,6 +28,17 @@ def angle(q):
     return 2 * math.atan2(math.hypot(*q[1:]), abs(q[0]))
 
 
+def rotation_vector(q):
+    """Log of the rotation, radians; its length is at most pi."""
+    q = q if q[0] >= 0 else tuple(-x for x in q)
+    half = math.hypot(*q[1:])
+    return scaled(2 * math.atan2(half, q[0]) / half if half > 1e-12 else 2.0, q[1:])
+
+
+def cross(a, b):
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
 def slerp(a, b, share):
     if sum(x * y for x, y in zip(a, b)) < 0:
         b = tuple(-x for x in b)

@@ -3,30 +3,35 @@
 from real_lib.funnel import table
 
 HEAD = ["| | ATE m, own scale | of the path | scale | scale of each piece | drift of scale | coverage | clock ms | "
-        "revisits: pairs, error | maps |", "|---|---|---|---|---|---|---|---|---|---|"]
-CONSTRAINTS_HEAD = ["| | accepted | of revisits | refused | switched off | checked | wrong | median error | most frequent refusals |",
-                    "|---|---|---|---|---|---|---|---|---|"]
+        "revisits: pairs, error | a second: error | maps |", "|---|---|---|---|---|---|---|---|---|---|---|"]
+CONSTRAINTS_HEAD = ["| | accepted | of revisits | refused | switched off | checked | wrong | median error | cycles: NEES, mean, median | "
+                    "most frequent refusals |", "|---|---|---|---|---|---|---|---|---|---|"]
 
 
 def number(value, form):
     return "–" if value is None else format(value, form)
 
 
+def error(medians):
+    return "–" if medians["median_m"] is None else f"{medians['median_m']:.3f} m {medians['median_deg']:.2f}°"
+
+
 def row(name, r):
     if not r:
-        return f"| {name} | no value | | | | | | | | |"
+        return f"| {name} | no value | | | | | | | | | |"
     again = r["revisits"]
-    error = f"{again['pairs']}, {again['median_m']:.2f} m {again['median_deg']:.1f}°" if again["pairs"] else "0"
+    revisits = f"{again['pairs']}, {error(again)}" if again["pairs"] else "0"
     return (f"| {name} | {r['ate_m']:.4f} | {number(r['ate_share'], '.2%')} | {r['scale']:.3f} | "
             f"{', '.join(f'{s:.3f}' for s in r['piece_scales'])} | {number(r['drift'], '.3f')} | {r['coverage']:.2f} | "
-            f"{1e3 * r['shift_s']:.0f} | {error} | {r['maps']} |")
+            f"{1e3 * r['shift_s']:.0f} | {revisits} | {error(r['a_second'])} | {r['maps']} |")
 
 
 def constraints_row(name, c):
     reasons = sorted(c["refused_by_reason"].items(), key=lambda item: -item[1])[:3]
-    error = "–" if c["median_m"] is None else f"{c['median_m']:.3f} m {c['median_deg']:.2f}°"
+    cycles = c["cycles"]
+    agree = f"{cycles['number']}: {cycles['mean']:.1f}, {cycles['median']:.1f}" if cycles["number"] else "–"
     return (f"| {name} | {c['accepted']} | {c['revisits']} | {c['refused']} | {c['switched_off']} | {c['checked']} | {c['wrong']} | "
-            f"{error} | {', '.join(f'{count} {reason}' for reason, count in reasons)} |")
+            f"{error(c)} | {agree} | {', '.join(f'{count} {reason}' for reason, count in reasons)} |")
 
 
 def spread(rows):
