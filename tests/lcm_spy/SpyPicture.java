@@ -41,7 +41,7 @@ public class SpyPicture {
   static Frame frameTitled(String text) throws Exception {
     for (int i = 0; i < 100; ++i) {
       for (Frame frame : Frame.getFrames()) {
-        if (frame.isVisible() && frame.getTitle().contains(text)) {
+        if (frame.isVisible() && frame.getTitle() != null && frame.getTitle().contains(text)) {
           return frame;
         }
       }
