@@ -107,7 +107,10 @@ class RevisitsTest(unittest.TestCase):
         self.assertGreaterEqual(exact["pairs"], 40)
         self.assertLess(exact["median_m"], 1e-3)
         drifting = [(t, (q, rot.add(p, (0.02 * (t - 100), 0.0, 0.0)))) for t, (q, p) in loop()]
-        self.assertAlmostEqual(measure.measure(drifting, pieces)["revisits"]["median_m"], 0.4, delta=0.05)
+        found = measure.measure(drifting, pieces)
+        self.assertAlmostEqual(found["revisits"]["median_m"], 0.4, delta=0.05)
+        self.assertAlmostEqual(found["a_second"]["median_m"], 0.02, delta=0.01)
+        self.assertLess(measure.measure(seen(loop(), 0.5), pieces)["a_second"]["median_m"], 1e-3)
 
     def test_one_round_has_none(self):
         self.assertEqual(measure.measure(loop(15), [trajectory.Piece(loop(15), 0)])["revisits"]["pairs"], 0)
@@ -120,13 +123,16 @@ class RevisitsTest(unittest.TestCase):
         def constraint(t, u, off_m=0.0, scale=0.5):
             a, b = (rot.compose(dict(reference)[s], rot.inverse((Q, rot.scaled(1 / scale, T_body_cam[1])))) for s in (t, u))
             q, p = rot.between(a, b)
-            return t, u, (q, rot.add(rot.scaled(scale, p), (scale * off_m, 0.0, 0.0)))
+            covariance = [[0.01 * (i == j) for j in range(6)] for i in range(6)]
+            return t, u, (q, rot.add(rot.scaled(scale, p), (scale * off_m, 0.0, 0.0))), covariance
 
         def check(*given):
             result = measure.check_constraints(given, pieces, 0.5, T_body_cam)
             return result["checked"], result["wrong"], result["revisits"]
 
         self.assertEqual(check(constraint(101.0, 104.0), constraint(101.0, 113.0, 0.49)), (2, 0, 1))
+        nees = measure.check_constraints([constraint(101.0, 104.0, 0.4)], pieces, 0.5, T_body_cam)["nees"]
+        self.assertAlmostEqual(nees["mean"], 0.2 ** 2 / 0.01 / 6, places=6)
         self.assertEqual(check(constraint(101.0, 104.0, 0.51)), (1, 1, 0))
         self.assertEqual(check(constraint(101.0, 125.0, 0.9)), (1, 0, 1))  # between pieces
         self.assertEqual(check(constraint(101.0, 125.0, 1.1)), (1, 1, 1))
@@ -307,12 +313,12 @@ class CyclesTest(unittest.TestCase):
 
     @mock.patch.object(cycles, "DRIFT_M", 0)
     def test_errors_as_large_as_claimed_give_one(self):
-        self.assertAlmostEqual(cycles.spread(self.nees())["mean"], 1, delta=0.1)
-        self.assertAlmostEqual(cycles.spread(self.nees(claimed=0.25))["mean"], 4, delta=0.6)
+        self.assertAlmostEqual(measure.mean_and_median(self.nees())["mean"], 1, delta=0.1)
+        self.assertAlmostEqual(measure.mean_and_median(self.nees(claimed=0.25))["mean"], 4, delta=0.6)
 
     def test_constraints_far_apart_make_no_cycle(self):
         self.assertEqual(self.nees(2, apart_s=2.5), [])
-        self.assertEqual(cycles.spread([]), {"number": 0, "mean": None, "median": None})
+        self.assertEqual(measure.mean_and_median([]), {"number": 0, "mean": None, "median": None})
 
 
 class TablesTest(unittest.TestCase):

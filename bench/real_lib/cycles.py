@@ -20,21 +20,21 @@ def nees(found, motion):
             if abs(k[0] - l[0]) <= NEAR_S and abs(k[1] - l[1]) <= NEAR_S and (value := _of_cycle(k, l, maps, motion)) is not None]
 
 
-def spread(values):
-    """Their number, mean and median."""
-    return {"number": len(values), "mean": sum(values) / len(values) if values else None, "median": sorted(values)[len(values) // 2] if values else None}
-
-
 def _of_cycle(k, l, maps, motion):
     before, after = motion(maps[0], k[0], l[0]), motion(maps[1], l[1], k[1])
     if not before or not after:
         return None
     predicted = rot.compose(rot.compose(before, l[2]), after)
-    error = [*rot.subtract(k[2][1], predicted[1]), *rot.rotation_vector(rot.multiply(k[2][0], rot.conjugate(predicted[0])))]
     covariance = _sum(k[3], _moved(l[3], before[0], rot.rotate(l[2][0], after[1])))
     metres = math.hypot(*before[1]) + math.hypot(*after[1])
     for i in range(6):
         covariance[i][i] += (DRIFT_M * metres) ** 2 if i < 3 else 2 * DRIFT_RAD ** 2
+    return nees_of(k[2], predicted, covariance)
+
+
+def nees_of(T, T_expected, covariance):
+    """Per dimension; covariance of (translation, rotation), both in the left frame (docs/conventions.md)."""
+    error = [*rot.subtract(T[1], T_expected[1]), *rot.rotation_vector(rot.multiply(T[0], rot.conjugate(T_expected[0])))]
     return sum(e * x for e, x in zip(error, solved(covariance, error))) / 6
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from real_lib import rotations as rot
 from real_lib import trajectory
 from real_lib.alignment import centred, common_scale, rmse
+from real_lib.cycles import nees_of
 
 MIN_POSES = 8  # for a piece, or for a half of it
 SHIFT_S, SHIFT_STEP_S = 0.1, 0.005  # range of the search, in both directions, and its step
@@ -152,24 +153,33 @@ def middle_of(values):
     return sorted(values)[len(values) // 2]
 
 
+def mean_and_median(values):
+    return {"number": len(values), "mean": sum(values) / len(values) if values else None, "median": middle_of(values) if values else None}
+
+
 def check_constraints(constraints, pieces, scale, T_body_cam):
-    """Checks the accepted constraints (from stamp, to stamp, T_from_to of the bodies, ...) that the reference covers: checked, wrong, of revisits.
+    """Checks the accepted constraints (from stamp, to stamp, T_from_to of the bodies, covariance) that the reference
+    covers: checked, wrong, of revisits, NEES.
 
     Wrong within one piece: an error above WRONG_M or WRONG_RAD; between two pieces of one frame: ACROSS times as much."""
     result = {"checked": 0, "wrong": 0, "revisits": 0, "median_m": None, "median_deg": None}
-    metres, radians = [], []
-    for t, u, T_from_to, *_ in constraints:
+    metres, radians, nees = [], [], []
+    for t, u, T_from_to, covariance in constraints:
         a, b = (in_pieces(pieces, stamp) for stamp in (t, u))
         result["revisits"] += abs(t - u) >= REVISIT_APART_S
         if not a or not b or a[0].frame != b[0].frame:
             continue
         T = rot.compose(rot.compose(rot.inverse(T_body_cam), T_from_to), T_body_cam)
-        m, r = difference(T, rot.between(a[1], b[1]), scale)
+        expected_q, expected_p = rot.between(a[1], b[1])
+        m, r = difference(T, (expected_q, expected_p), scale)
+        T_expected = rot.compose(rot.compose(T_body_cam, (expected_q, rot.scaled(scale or 1, expected_p))), rot.inverse(T_body_cam))
+        nees.append(nees_of(T_from_to, T_expected, covariance))
         bound = 1 if a[0] is b[0] else ACROSS
         result["checked"] += 1
         result["wrong"] += m > bound * WRONG_M or r > bound * WRONG_RAD
         metres.append(m)
         radians.append(r)
+    result["nees"] = mean_and_median(nees)
     if metres:
         result.update(median_m=middle_of(metres), median_deg=math.degrees(middle_of(radians)))
     return result

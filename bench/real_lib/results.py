@@ -5,9 +5,9 @@ from accuracy_lib.metrics import read_json
 from real_lib import rotations as rot
 from real_lib import trajectory
 from real_lib.constraints import accepted
-from real_lib.cycles import nees, spread
+from real_lib.cycles import nees
 from real_lib.funnel import covisible, funnel
-from real_lib.measure import best_shift, check_constraints, measure
+from real_lib.measure import best_shift, check_constraints, mean_and_median, measure
 
 
 class Results:
@@ -75,7 +75,7 @@ class Results:
         counts = report["constraints"]
         return {"accepted": counts["accepted"], "refused": counts["refused"], "refused_by_reason": counts["refused_by_reason"],
                 "switched_off": sum(group["constraints_switched_off"] for group in report["groups"]),
-                "cycles": spread(nees(found, motion)),
+                "cycles": mean_and_median(nees(found, motion)),
                 **check_constraints([c for constraints in found.values() for c in constraints], self.pieces, scale, self.T_body_cam)}
 
     def _measured(self, body_poses, maps):

@@ -4,8 +4,8 @@ from real_lib.funnel import table
 
 HEAD = ["| | ATE m, own scale | of the path | scale | scale of each piece | drift of scale | coverage | clock ms | "
         "revisits: pairs, error | a second: error | maps |", "|---|---|---|---|---|---|---|---|---|---|---|"]
-CONSTRAINTS_HEAD = ["| | accepted | of revisits | refused | switched off | checked | wrong | median error | cycles: NEES, mean, median | "
-                    "most frequent refusals |", "|---|---|---|---|---|---|---|---|---|---|"]
+CONSTRAINTS_HEAD = ["| | accepted | of revisits | refused | switched off | checked | wrong | median error | NEES: number, mean, median | of cycles | "
+                    "most frequent refusals |", "|---|---|---|---|---|---|---|---|---|---|---|"]
 
 
 def number(value, form):
@@ -14,6 +14,10 @@ def number(value, form):
 
 def error(medians):
     return "–" if medians["median_m"] is None else f"{medians['median_m']:.3f} m {medians['median_deg']:.2f}°"
+
+
+def nees(values):
+    return f"{values['number']}: {values['mean']:.1f}, {values['median']:.1f}" if values["number"] else "–"
 
 
 def row(name, r):
@@ -28,10 +32,8 @@ def row(name, r):
 
 def constraints_row(name, c):
     reasons = sorted(c["refused_by_reason"].items(), key=lambda item: -item[1])[:3]
-    cycles = c["cycles"]
-    agree = f"{cycles['number']}: {cycles['mean']:.1f}, {cycles['median']:.1f}" if cycles["number"] else "–"
     return (f"| {name} | {c['accepted']} | {c['revisits']} | {c['refused']} | {c['switched_off']} | {c['checked']} | {c['wrong']} | "
-            f"{error(c)} | {agree} | {', '.join(f'{count} {reason}' for reason, count in reasons)} |")
+            f"{error(c)} | {nees(c['nees'])} | {nees(c['cycles'])} | {', '.join(f'{count} {reason}' for reason, count in reasons)} |")
 
 
 def spread(rows):
