@@ -38,6 +38,13 @@ foreach(package qrencode sodium zstd)
     IMPORTED_LOCATION ${${package}_LIBRARY} INTERFACE_INCLUDE_DIRECTORIES ${${package}_INCLUDE_DIR})
 endforeach()
 
+# Debian's CMake package of libapriltag asks for OpenCV, which only its examples use.
+find_path(apriltag_INCLUDE_DIR apriltag/apriltag.h REQUIRED)
+find_library(apriltag_LIBRARY apriltag REQUIRED)
+add_library(apriltag::apriltag UNKNOWN IMPORTED)
+set_target_properties(apriltag::apriltag PROPERTIES
+  IMPORTED_LOCATION ${apriltag_LIBRARY} INTERFACE_INCLUDE_DIRECTORIES ${apriltag_INCLUDE_DIR})
+
 # CHOLMOD is the only part of SuiteSparse that the modules link directly.
 find_path(CHOLMOD_INCLUDE_DIR cholmod.h PATH_SUFFIXES suitesparse REQUIRED)
 find_library(CHOLMOD_LIBRARY cholmod REQUIRED)

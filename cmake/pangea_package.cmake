@@ -32,5 +32,5 @@ set(CPACK_COMPONENT_DEV_DESCRIPTION
   "The modules as libraries for find_package(pangea), their headers, and the messages\n\
 (lcmtypes) with their C++ headers.")
 string(JOIN ", " CPACK_DEBIAN_DEV_PACKAGE_DEPENDS ${openblas} libboost-dev libceres-dev libcli11-dev libfmt-dev
-  libjpeg-dev liblcm-dev libopencv-calib3d-dev libopencv-video-dev libpng-dev libqrencode-dev libsodium-dev libssl-dev libsuitesparse-dev libyaml-cpp-dev libzstd-dev nlohmann-json3-dev zlib1g-dev)
+  libapriltag-dev libjpeg-dev liblcm-dev libopencv-calib3d-dev libopencv-video-dev libpng-dev libqrencode-dev libsodium-dev libssl-dev libsuitesparse-dev libyaml-cpp-dev libzstd-dev nlohmann-json3-dev zlib1g-dev)
 include(CPack)

@@ -26,7 +26,7 @@ def quoted(text):
 SUBSCRIPTION = re.compile(r"(?:Subscribe|Listen)<(\w+)>\(\s*(?:std::string\()?channels::(\w+)")
 
 
-BOTH_TYPES = {"KeyframeMessage": "keyframe_3_t"}  # decodes keyframe_2_t and keyframe_t too
+BOTH_TYPES = {"KeyframeMessage": "keyframe_4_t"}  # decodes the older types too
 
 
 def channels_in_code():

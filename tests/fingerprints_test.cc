@@ -17,6 +17,7 @@
 #include "pangea/journal_file_t.hpp"
 #include "pangea/keyframe_2_t.hpp"
 #include "pangea/keyframe_3_t.hpp"
+#include "pangea/keyframe_4_t.hpp"
 #include "pangea/keyframe_t.hpp"
 #include "pangea/landmarks_t.hpp"
 #include "pangea/map_state_t.hpp"
@@ -47,6 +48,7 @@ TEST(Fingerprints, ArePinned) {
   EXPECT_EQ(static_cast<uint64_t>(keyframe_t::getHash()), 0x59b338437f11086du);
   EXPECT_EQ(static_cast<uint64_t>(keyframe_2_t::getHash()), 0x1eb6373b1cc1ddb2u);
   EXPECT_EQ(static_cast<uint64_t>(keyframe_3_t::getHash()), 0x353f3c02c32f26c3u);
+  EXPECT_EQ(static_cast<uint64_t>(keyframe_4_t::getHash()), 0x973ced6e2d9864a8u);
   EXPECT_EQ(static_cast<uint64_t>(landmarks_t::getHash()), 0xc37fda84c71fcf58u);
   EXPECT_EQ(static_cast<uint64_t>(map_state_t::getHash()), 0xb735441a70264ce5u);
   EXPECT_EQ(static_cast<uint64_t>(options_t::getHash()), 0x68b9878722173cbcu);

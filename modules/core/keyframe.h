@@ -14,6 +14,7 @@
 #include "core/ids.h"
 #include "core/imu/preintegration.h"
 #include "core/rigid3.h"
+#include "core/tags/tag.h"
 
 namespace pangea {
 
@@ -78,7 +79,8 @@ struct Keyframe {
   DescriptorKind descriptor_kind = DescriptorKind::kOrb;
   std::vector<Corner> corners;
   std::vector<MapPoint> points;
-  int64_t group_revision = 0;  // of the newest correction that the agent had applied; 0: none
+  std::vector<TagObservation> tags;  // at most kMaxTags, each with another identity
+  int64_t group_revision = 0;        // of the newest correction that the agent had applied; 0: none
   // Errors that all keyframes of a map share. The covariances above do not include them.
   double scale_sigma = 0;  // share of lengths, at most kMaxScaleSigma; 0: exact, or no depth yet
   Matrix6d T_body_cam_covariance = Matrix6d::Zero();  // (translation, rotation), body; 0: exact

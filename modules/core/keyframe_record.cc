@@ -57,6 +57,30 @@ void VisitPreintegration(PreintegrationType& p, const Visit& visit) {
   visit(&p.accel_bias);
 }
 
+void PutTags(const std::vector<TagObservation>& tags, ByteWriter* writer) {
+  writer->PutCount(tags.size());
+  for (const TagObservation& seen : tags) {
+    writer->Put(seen.tag.family);
+    writer->Put(seen.tag.id);
+    for (const Eigen::Vector2f& corner : seen.corners) {
+      writer->Put(corner);
+    }
+  }
+}
+
+void GetTags(ByteReader* reader, std::vector<TagObservation>* tags) {
+  constexpr size_t kTagBytes =
+      sizeof(TagFamily) + sizeof(int32_t) + 2 * sizeof(float) * kTagCorners;
+  tags->resize(reader->GetCount(kTagBytes));
+  for (TagObservation& seen : *tags) {
+    reader->Get(&seen.tag.family);
+    reader->Get(&seen.tag.id);
+    for (Eigen::Vector2f& corner : seen.corners) {
+      reader->Get(&corner);
+    }
+  }
+}
+
 }  // namespace
 
 void PutCorners(const std::vector<Corner>& corners, ByteWriter* writer) {
@@ -100,6 +124,7 @@ std::vector<uint8_t> ToRecord(const Keyframe& keyframe) {
     writer.Put(point.inverse_depth);
     writer.Put(point.inverse_depth_var);
   }
+  PutTags(keyframe.tags, &writer);
   return writer.Take();
 }
 
@@ -127,6 +152,7 @@ std::optional<Keyframe> KeyframeFromRecord(std::span<const uint8_t> record) {
       return std::nullopt;
     }
   }
+  GetTags(&reader, &keyframe.tags);
   return reader.ok() && reader.at_end() ? std::make_optional(std::move(keyframe)) : std::nullopt;
 }
 

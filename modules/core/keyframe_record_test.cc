@@ -42,6 +42,7 @@ Keyframe Full() {
   keyframe.corners.resize(3);
   keyframe.corners[1] = {{100.0625F, 3.5F}, 4, {1, 2, 3, ~uint64_t{0}}, 99};
   keyframe.points = {{1, 0.5F, 0.01F}, {2, 0.25F, 0.02F}};
+  keyframe.tags = {{{TagFamily::k36h11, 17}, {{{1, 2}, {3, 2}, {3, 1}, {1, 1.25F}}}}};
   keyframe.group_revision = 5;
   return keyframe;
 }
@@ -96,6 +97,9 @@ TEST(KeyframeRecord, ComesBackToTheLastBit) {
   EXPECT_EQ(back->points[1].corner, 2);
   EXPECT_EQ(back->points[1].inverse_depth, 0.25F);
   EXPECT_EQ(back->points[1].inverse_depth_var, 0.02F);
+  ASSERT_EQ(back->tags.size(), 1u);
+  EXPECT_EQ(back->tags[0].tag, keyframe.tags[0].tag);
+  EXPECT_EQ(back->tags[0].corners, keyframe.tags[0].corners);
   EXPECT_EQ(back->group_revision, 5);
   EXPECT_EQ(ToRecord(*back), record);
 }

@@ -7,6 +7,7 @@
 #include "core/big_endian.h"
 #include "pangea/keyframe_2_t.hpp"
 #include "pangea/keyframe_3_t.hpp"
+#include "pangea/keyframe_4_t.hpp"
 
 namespace pangea {
 namespace {
@@ -27,6 +28,14 @@ keyframe_3_t WithKind(const KeyframeMessage& message) {
   return whole;
 }
 
+keyframe_4_t WithTags(const KeyframeMessage& message) {
+  keyframe_4_t whole{};
+  whole.keyframe = WithKind(message);
+  whole.num_tags = static_cast<int8_t>(message.tags.size());
+  whole.tags = message.tags;
+  return whole;
+}
+
 bool HasErrors(const KeyframeMessage& message) {
   return message.scale_sigma != 0 || std::any_of(std::begin(message.T_body_cam_covariance),
                                                  std::end(message.T_body_cam_covariance),
@@ -40,17 +49,26 @@ void Take(keyframe_2_t whole, KeyframeMessage* message) {
             message->T_body_cam_covariance);
 }
 
+void Take(keyframe_3_t whole, KeyframeMessage* message) {
+  message->descriptor_kind = whole.descriptor_kind;
+  Take(std::move(whole.keyframe), message);
+}
+
 }  // namespace
 
 bool KeyframeMessage::BeginsOne(const uint8_t* begin) {
   const uint64_t fingerprint = GetBigEndian(begin, sizeof(int64_t));
   return fingerprint == static_cast<uint64_t>(keyframe_t::getHash()) ||
          fingerprint == static_cast<uint64_t>(keyframe_2_t::getHash()) ||
-         fingerprint == static_cast<uint64_t>(keyframe_3_t::getHash());
+         fingerprint == static_cast<uint64_t>(keyframe_3_t::getHash()) ||
+         fingerprint == static_cast<uint64_t>(keyframe_4_t::getHash());
 }
 
 template <typename Use>
 int KeyframeMessage::WithType(Use use) const {
+  if (!tags.empty()) {
+    return use(WithTags(*this));
+  }
   if (descriptor_kind != 0) {
     return use(WithKind(*this));
   }
@@ -67,10 +85,15 @@ int KeyframeMessage::getEncodedSize() const {
 
 int KeyframeMessage::decode(const void* buf, int offset, int maxlen) {
   *this = {};
-  keyframe_3_t newest{};
+  keyframe_4_t newest{};
   if (const int size = newest.decode(buf, offset, maxlen); size >= 0) {
-    descriptor_kind = newest.descriptor_kind;
+    tags = std::move(newest.tags);
     Take(std::move(newest.keyframe), this);
+    return size;
+  }
+  keyframe_3_t with_kind{};
+  if (const int size = with_kind.decode(buf, offset, maxlen); size >= 0) {
+    Take(std::move(with_kind), this);
     return size;
   }
   keyframe_2_t whole{};

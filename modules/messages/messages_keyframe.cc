@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <set>
 
 #include "messages/messages.h"
 #include "messages/messages_checks.h"
@@ -138,6 +139,44 @@ std::string UnpackPoints(const KeyframeMessage& m, Keyframe* keyframe) {
   return "";
 }
 
+// Four pixels of a square that is seen from its front, far enough from a line.
+bool IsTagOutline(const TagObservation& seen) {
+  constexpr double kMinArea_px2 = 16;
+  double area = 0;  // by the shoelace formula; y points down
+  for (int i = 0; i < kTagCorners; ++i) {
+    const Eigen::Vector2d a = seen.corners[i].cast<double>();
+    const Eigen::Vector2d b = seen.corners[(i + 1) % kTagCorners].cast<double>();
+    area += 0.5 * (b.x() * a.y() - a.x() * b.y());
+  }
+  return area >= kMinArea_px2;
+}
+
+std::string UnpackTags(const KeyframeMessage& m, Keyframe* keyframe) {
+  if (m.tags.size() > kMaxTags) {
+    return fmt::format("num_tags {} out of 1 to {}", m.tags.size(), kMaxTags);
+  }
+  std::set<TagId> known;
+  for (const tag_t& tag : m.tags) {
+    const auto family = TagFamilyOf(tag.family);
+    if (!family || tag.id < 0 || tag.id >= NumTagIds(*family)) {
+      return fmt::format("a tag of family {} with id {} is unknown to this version", tag.family,
+                         tag.id);
+    }
+    TagObservation seen{{*family, tag.id}, {}};
+    for (int i = 0; i < kTagCorners; ++i) {
+      seen.corners[i] = {tag.u_px[i], tag.v_px[i]};
+      if (!keyframe->camera.Contains(seen.corners[i].cast<double>(), -1.0)) {
+        return "a tag's corner is outside the image";
+      }
+    }
+    if (!IsTagOutline(seen) || !known.insert(seen.tag).second) {
+      return "a tag is no square seen from its front, or is there twice";
+    }
+    keyframe->tags.push_back(seen);
+  }
+  return "";
+}
+
 std::string UnpackEdge(const KeyframeMessage& m, Keyframe* keyframe) {
   if (m.has_edge) {
     const auto T = pangea::Parse(m.T_from_this);
@@ -207,6 +246,15 @@ KeyframeMessage ToMessage(const Keyframe& keyframe) {
   m.scale_sigma = keyframe.scale_sigma;
   m.descriptor_kind = static_cast<int8_t>(keyframe.descriptor_kind);
   FromMatrix(keyframe.T_body_cam_covariance, m.T_body_cam_covariance);
+  for (const TagObservation& seen : keyframe.tags) {
+    tag_t& tag = m.tags.emplace_back();
+    tag.family = static_cast<int8_t>(seen.tag.family);
+    tag.id = seen.tag.id;
+    for (int i = 0; i < kTagCorners; ++i) {
+      tag.u_px[i] = seen.corners[i].x();
+      tag.v_px[i] = seen.corners[i].y();
+    }
+  }
   return m;
 }
 
@@ -247,7 +295,7 @@ Parsed<Keyframe> Parse(const KeyframeMessage& m) {
   if (std::string reason = UnpackCommonErrors(m, &keyframe); !reason.empty()) {
     return Refused<Keyframe>(std::move(reason));
   }
-  for (const auto& unpack : {UnpackEdge, UnpackCorners, UnpackPoints}) {
+  for (const auto& unpack : {UnpackEdge, UnpackCorners, UnpackPoints, UnpackTags}) {
     if (std::string reason = unpack(m, &keyframe); !reason.empty()) {
       return Refused<Keyframe>(std::move(reason));
     }

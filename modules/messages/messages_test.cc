@@ -118,6 +118,46 @@ TEST(Messages, AKeyframeSaysOfWhichKindItsDescriptorsAre) {
   EXPECT_EQ(out.value->corners.size(), in.corners.size());
 }
 
+TagObservation TestTag(int id) {
+  return {{TagFamily::k36h11, id}, {{{100.5F, 180.25F}, {180, 180}, {180, 100}, {100, 100.125F}}}};
+}
+
+TEST(Messages, AKeyframeHasTheTagsThatItSees) {
+  Keyframe in = RandomKeyframe(1);
+  in.descriptor_kind = DescriptorKind::kPatchNetwork;
+  const size_t without = EncodeMessage(ToMessage(in)).size();
+  in.tags = {TestTag(17), TestTag(586)};
+  EXPECT_EQ(EncodeMessage(ToMessage(in)).size(), without + 1 + 2 * 37);
+  const auto out = Parse(ThroughBytes(ToMessage(in)));
+  ASSERT_TRUE(out.value) << out.refused;
+  EXPECT_EQ(out.value->descriptor_kind, DescriptorKind::kPatchNetwork);
+  ASSERT_EQ(out.value->tags.size(), 2u);
+  EXPECT_EQ(out.value->tags[1].tag, in.tags[1].tag);
+  EXPECT_EQ(out.value->tags[0].corners, in.tags[0].corners);
+}
+
+TEST(Messages, ATagOutOfBoundsIsRefused) {
+  const auto refused = [](const auto& spoil) {
+    Keyframe keyframe = RandomKeyframe(1);
+    keyframe.tags = {TestTag(17), TestTag(18)};
+    KeyframeMessage message = ToMessage(keyframe);
+    spoil(&message);
+    const auto out = Parse(ThroughBytes(message));
+    EXPECT_FALSE(out.value);
+    return out.refused;
+  };
+  using M = KeyframeMessage*;
+  EXPECT_NE(refused([](M m) { m->tags[0].family = 2; }).find("family 2"), std::string::npos);
+  EXPECT_NE(refused([](M m) { m->tags[0].id = 587; }).find("id 587"), std::string::npos);
+  EXPECT_NE(refused([](M m) { m->tags[0].id = -1; }), "");
+  EXPECT_NE(refused([](M m) { m->tags[0].u_px[2] = 5000; }).find("outside"), std::string::npos);
+  EXPECT_NE(refused([](M m) { m->tags[0].u_px[2] = NAN; }).find("outside"), std::string::npos);
+  EXPECT_NE(refused([](M m) { m->tags[0].id = 18; }).find("twice"), std::string::npos);
+  EXPECT_NE(refused([](M m) { std::swap(m->tags[0].u_px, m->tags[0].v_px); }), "");
+  EXPECT_NE(refused([](M m) { m->tags.resize(kMaxTags + 1, m->tags[0]); }).find("num_tags"),
+            std::string::npos);
+}
+
 TEST(Messages, AKindOfDescriptorsThatNobodyKnowsIsNamed) {
   KeyframeMessage message = ToMessage(RandomKeyframe(1));
   for (const int kind : {-1, kNumDescriptorKinds, 100}) {

@@ -37,6 +37,9 @@ Vio::Vio(int32_t agent_id, const CameraModel& camera, const ImuNoise& noise,
       repeated_images_(camera),
       repeat_stamps_(camera),
       describer_(camera, options.describer) {
+  if (options.tags) {
+    tag_detector_.emplace();
+  }
   OpenNewMap();
 }
 
@@ -212,7 +215,9 @@ VioOutput Vio::Estimate(const TrackedFrame& frame, const cv::Mat& image,
     return output;
   }
   if (result.is_keyframe) {
-    described_[frame.utime] = describer_.Describe(image, frame, DownInCamera(result, imu));
+    described_[frame.utime] = {
+        describer_.Describe(image, frame, DownInCamera(result, imu)),
+        tag_detector_ ? tag_detector_->Detect(image) : std::vector<TagObservation>()};
   }
   if (result.state == EstimatorState::kTracking) {
     map_has_poses_ = true;
@@ -225,7 +230,7 @@ VioOutput Vio::Estimate(const TrackedFrame& frame, const cv::Mat& image,
 Vio::View Vio::NewestKeyframe(const VioOutput& output) const {
   Keyframe keyframe;
   keyframe.camera = estimator_->camera();
-  keyframe.corners = described_.at(output.utime);
+  keyframe.corners = described_.at(output.utime).corners;
   CompensateRollingShutter(output.motion, keyframe);
   return {keyframe.camera, std::move(keyframe.corners), describer_.kind(), estimator_->Poses()};
 }
@@ -271,7 +276,8 @@ Keyframe Vio::Complete(const FinishedKeyframe& finished) {
   keyframe.preintegration = finished.preintegration;
   keyframe.descriptor_kind = describer_.kind();
   if (auto node = described_.extract(finished.utime)) {
-    keyframe.corners = std::move(node.mapped());
+    keyframe.corners = std::move(node.mapped().corners);
+    keyframe.tags = std::move(node.mapped().tags);
   }
   keyframe.points = Points(finished, keyframe.corners);
   CompensateRollingShutter(finished.motion, keyframe);

@@ -22,6 +22,7 @@
 #include "vio/front_end/gyro_rotation.h"
 #include "vio/front_end/repeat_stamps.h"
 #include "vio/front_end/repeated_images.h"
+#include "vio/front_end/tags/tag_detector.h"
 #include "vio/front_end/tracker.h"
 #include "vio/window/estimator.h"
 
@@ -31,12 +32,14 @@ struct VioOptions {
   TrackerOptions tracker;
   DescriberOptions describer;
   EstimatorOptions estimator;
+  bool tags = true;
 
   template <typename Archive>
   void Visit(Archive& archive) {
     archive.Section("tracker", &tracker, "features from image to image");
     archive.Section("describer", &describer, "corners and descriptors of a keyframe");
     archive.Section("estimator", &estimator, "the window");
+    archive.Add("tags", &tags, "AprilTags are looked for in keyframes");
   }
 };
 
@@ -127,6 +130,7 @@ class Vio {
   RepeatedImages repeated_images_;
   RepeatStamps repeat_stamps_;
   Describer describer_;
+  std::optional<TagDetector> tag_detector_;
   std::optional<Estimator> estimator_;
   MapId map_;
   bool map_has_poses_ = false;
@@ -146,7 +150,11 @@ class Vio {
     cv::Mat image;
   };
   std::optional<HeldImage> held_;
-  std::map<int64_t, std::vector<Corner>> described_;  // corners of the window's keyframes, by utime
+  struct Described {
+    std::vector<Corner> corners;
+    std::vector<TagObservation> tags;
+  };
+  std::map<int64_t, Described> described_;  // the window's keyframes, by utime
 };
 
 }  // namespace pangea::vio

@@ -31,9 +31,9 @@ static int FuzzFields(const uint8_t* data, size_t size) {
   static const std::vector<LcmSchema> schemas = LcmSchemas();
   static const auto decoders =
       fuzz::DecodersOf<again_t, anchor_edit_t, anchor_t, camera_t, constraint_t, correction_t,
-                       have_t, image_t, keyframe_t, keyframe_2_t, keyframe_3_t, landmarks_t,
-                       map_state_t, others_t, place_match_t, resend_request_t, shown_anchors_t,
-                       status_t, verdict_request_t>();
+                       have_t, image_t, keyframe_t, keyframe_2_t, keyframe_3_t, keyframe_4_t,
+                       landmarks_t, map_state_t, others_t, place_match_t, resend_request_t,
+                       shown_anchors_t, status_t, verdict_request_t>();
   if (size == 0) {
     return 0;
   }

@@ -17,6 +17,7 @@
 #include "pangea/have_t.hpp"
 #include "pangea/keyframe_2_t.hpp"
 #include "pangea/keyframe_3_t.hpp"
+#include "pangea/keyframe_4_t.hpp"
 
 namespace pangea {
 namespace {
@@ -168,7 +169,7 @@ bool Archive::LoadEvent(const std::string& channel, Bytes data, const JournalPla
     }
     node_.Count("journal_events_unreadable");
     return !IsDamaged<keyframe_t>(data) && !IsDamaged<keyframe_2_t>(data) &&
-           !IsDamaged<keyframe_3_t>(data);
+           !IsDamaged<keyframe_3_t>(data) && !IsDamaged<keyframe_4_t>(data);
   }
   if (channel == channels::kPlaceMatch) {
     return LoadAnswer<place_match_t>(data, place);

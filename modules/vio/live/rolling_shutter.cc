@@ -52,6 +52,41 @@ double InverseDepthNear(const Eigen::Vector2f& pixel, const std::vector<SeenDept
   return static_cast<double>(Median(std::move(nearest)));
 }
 
+struct Moved {
+  Eigen::Vector2f pixel;
+  double z = 1;  // of a point that was at z = 1
+};
+
+// Where a global shutter would have seen the pixel; nothing if outside the image.
+std::optional<Moved> ByGlobalShutter(const CameraModel& camera, const BodyMotion& motion,
+                                     const Eigen::Vector2f& pixel, double inverse_depth) {
+  const auto ray = camera.Unproject(pixel.cast<double>());
+  if (!ray) {
+    return std::nullopt;
+  }
+  const Rigid3 T_cam_row = RowCamera(camera, motion, static_cast<double>(pixel.y()));
+  // Scaled by the inverse depth, so that a point at infinity is no special case.
+  const Vector3d moved =
+      T_cam_row.q * Vector3d(ray->x(), ray->y(), 1) + inverse_depth * T_cam_row.t;
+  const auto to = camera.Project(moved);
+  if (!to || !camera.Contains(*to)) {
+    return std::nullopt;
+  }
+  return Moved{to->cast<float>(), moved.z()};
+}
+
+void CompensateTags(const BodyMotion& motion, const std::vector<SeenDepth>& seen,
+                    Keyframe& keyframe) {
+  for (TagObservation& tag : keyframe.tags) {
+    for (Eigen::Vector2f& corner : tag.corners) {
+      if (const auto moved =
+              ByGlobalShutter(keyframe.camera, motion, corner, InverseDepthNear(corner, seen))) {
+        corner = moved->pixel;
+      }
+    }
+  }
+}
+
 }  // namespace
 
 void CompensateRollingShutter(const BodyMotion& motion, Keyframe& keyframe) {
@@ -66,26 +101,20 @@ void CompensateRollingShutter(const BodyMotion& motion, Keyframe& keyframe) {
   const std::vector<SeenDepth> seen = SeenDepths(keyframe);
   for (size_t i = 0; i < keyframe.corners.size(); ++i) {
     Corner& corner = keyframe.corners[i];
-    const auto ray = camera.Unproject(corner.pixel.cast<double>());
-    if (!ray) {
-      continue;
-    }
-    const Rigid3 T_cam_row = RowCamera(camera, motion, static_cast<double>(corner.pixel.y()));
     const double rho = point_of[i] != nullptr ? static_cast<double>(point_of[i]->inverse_depth)
                                               : InverseDepthNear(corner.pixel, seen);
-    // Scaled by rho, so that a point at infinity is no special case.
-    const Vector3d moved = T_cam_row.q * Vector3d(ray->x(), ray->y(), 1) + rho * T_cam_row.t;
-    const auto pixel = camera.Project(moved);
-    if (!pixel || !camera.Contains(*pixel)) {
+    const auto moved = ByGlobalShutter(camera, motion, corner.pixel, rho);
+    if (!moved) {
       continue;
     }
-    corner.pixel = pixel->cast<float>();
+    corner.pixel = moved->pixel;
     if (point_of[i] != nullptr) {
-      const double ratio = 1 / moved.z();
+      const double ratio = 1 / moved->z;
       point_of[i]->inverse_depth = static_cast<float>(rho * ratio);
       point_of[i]->inverse_depth_var *= static_cast<float>(ratio * ratio);
     }
   }
+  CompensateTags(motion, seen, keyframe);
 }
 
 }  // namespace pangea::vio

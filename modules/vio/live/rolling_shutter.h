@@ -8,9 +8,9 @@
 
 namespace pangea::vio {
 
-// Moves the corners and the map points' depths by the body's motion after the image's time. A map
-// point uses its own depth, any other corner the median depth of the map points around it. A corner
-// that would leave the image is not moved. Does nothing for a global shutter.
+// Moves the corners, those of tags too, and the map points' depths by the body's motion after the
+// image's time. A map point uses its own depth, any other corner the median depth of the map points
+// around it. A corner that would leave the image is not moved. Does nothing for a global shutter.
 void CompensateRollingShutter(const BodyMotion& motion, Keyframe& keyframe);
 
 }  // namespace pangea::vio
