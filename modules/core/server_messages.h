@@ -18,6 +18,7 @@ enum class PlaceKind : int8_t {
   // Only constraints have this kind, no candidates: such a constraint replaces those whose
   // keyframes were thinned away (thinning/thinning.h).
   kDerived = 3,
+  kTag = 4,  // both keyframes see an AprilTag with the same identity
 };
 
 struct PlaceCandidate {

@@ -79,6 +79,16 @@ TEST_F(VerificationProcesses, OneResultFromTheProcessOfItsKind) {
   EXPECT_EQ(constraints_[0].kind, PlaceKind::kInter);
 }
 
+// Also within one map: by fusion alone. These keyframes see no tag.
+TEST_F(VerificationProcesses, CandidatesByATagGoToFusion) {
+  SendKeyframes(agent_m_, 0, 12);
+  SendKeyframes(agent_c_, 0, 12);
+  SendMatch(PlaceKind::kTag);
+  ASSERT_EQ(constraints_.size(), 1u);
+  EXPECT_EQ(constraints_[0].kind, PlaceKind::kTag);
+  EXPECT_EQ(constraints_[0].reason, "no alignment by a common tag");
+}
+
 // A later keyframe with an id that exists already changes nothing.
 TEST_F(VerificationProcesses, AKeyframeIsTakenOnce) {
   SendKeyframes(agent_m_, 0, 12);

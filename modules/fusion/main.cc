@@ -5,5 +5,5 @@
 int main(int argc, char** argv) {
   return pangea::CandidateMain<pangea::FusionProcess>(
       argc, argv, "pangea-fusion",
-      "Aligns maps: a verification result for every place match between two maps");
+      "Aligns maps: a verification result for every place match between two maps", true);
 }

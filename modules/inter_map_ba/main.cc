@@ -5,5 +5,5 @@
 int main(int argc, char** argv) {
   return pangea::CandidateMain<pangea::InterMapBaProcess>(
       argc, argv, "pangea-inter-map-ba",
-      "Closes loops: a verification result for every place match within one map");
+      "Closes loops: a verification result for every place match within one map", false);
 }

@@ -206,6 +206,7 @@ void CheckConstraintId(const std::vector<std::string>& logs, int64_t constraint_
   for (const KeyframeId& from : keyframes) {
     for (const KeyframeId& to : keyframes) {
       if (ConstraintId(from, to, PlaceKind::kInter) == constraint_id ||
+          ConstraintId(from, to, PlaceKind::kTag) == constraint_id ||
           (from.map == to.map && ConstraintId(from, to, PlaceKind::kIntra) == constraint_id)) {
         return;
       }

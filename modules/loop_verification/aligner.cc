@@ -1,6 +1,7 @@
 #include "loop_verification/aligner.h"
 
 #include <cmath>
+#include <span>
 #include <utility>
 
 #include "loop_verification/extrinsics_error.h"
@@ -47,7 +48,9 @@ Constraint Aligner::Align(const CandidateKeyframes& keyframes, const PlaceCandid
   constraint.from = candidate.match;
   constraint.to = keyframes.c.back()->keyframe().id;
   constraint.kind = candidate.kind;
-  for (const VerificationStep& step : kVerificationSteps) {
+  using Steps = std::span<const VerificationStep>;
+  for (const VerificationStep& step :
+       candidate.kind == PlaceKind::kTag ? Steps(kTagSteps) : Steps(kVerificationSteps)) {
     verification.step = step.name;
     constraint.reason = step.run(options_, &verification);
     if (!constraint.reason.empty()) {

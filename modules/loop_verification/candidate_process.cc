@@ -15,7 +15,7 @@
 namespace pangea {
 namespace {
 
-constexpr uint32_t kCheckpointFormat = 5;
+constexpr uint32_t kCheckpointFormat = 6;
 constexpr char kJournalOwner[] = "agent_handler";
 
 }  // namespace
@@ -50,7 +50,7 @@ CandidateProcess::CandidateProcess(Bus& bus, const std::string& name, PlaceKind 
 // The journal also has the results of the other kind. While they run, neither process learns those
 // of the other.
 void CandidateProcess::OnFormerResult(const Constraint& result) {
-  const bool of_the_other = result.kind != kind_ && result.kind != PlaceKind::kDerived;
+  const bool of_the_other = !IsMine(result.kind) && result.kind != PlaceKind::kDerived;
   if (!of_the_other && verified_.insert(result.Id()).second) {
     verifier_.NoteVerified(result);
     ForgetAhead(result.to);
@@ -74,7 +74,7 @@ bool CandidateProcess::Restore(ByteReader* reader) {
 
 bool CandidateProcess::IsComplete(const PlaceMatch& match) const {
   return std::ranges::all_of(match.candidates, [&](const PlaceCandidate& candidate) {
-    return candidate.kind != kind_ || verified_.contains(ConstraintId(match.query, candidate));
+    return !IsMine(candidate.kind) || verified_.contains(ConstraintId(match.query, candidate));
   });
 }
 
@@ -88,7 +88,7 @@ bool CandidateProcess::TakeMatch(const PlaceMatch& match) {
   }
   ForgetAhead(match.query);
   for (const PlaceCandidate& candidate : match.candidates) {
-    if (candidate.kind == kind_ && !verified_.contains(ConstraintId(match.query, candidate))) {
+    if (IsMine(candidate.kind) && !verified_.contains(ConstraintId(match.query, candidate))) {
       waiting_.emplace(std::make_pair(match.query, candidate.match), candidate);
     }
   }

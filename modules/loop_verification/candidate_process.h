@@ -56,6 +56,10 @@ class CandidateProcess : public Process {
   static constexpr size_t kMaxWaiting = 2000;
   static constexpr size_t kMaxSent = 5000;
 
+  // Candidates by a tag go to fusion, also those within one map.
+  bool IsMine(PlaceKind kind) const {
+    return kind == kind_ || (kind == PlaceKind::kTag && kind_ == PlaceKind::kInter);
+  }
   void Save(ByteWriter* writer) const;
   bool Restore(ByteReader* reader);
   bool IsComplete(const PlaceMatch& match) const;

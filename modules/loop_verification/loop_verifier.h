@@ -47,13 +47,16 @@ struct VerificationTask {
 
 class LoopVerifier {
  public:
-  // `records`: stores keyframes (keyframe_store.h); null: they stay in memory.
+  // `records`: stores keyframes (keyframe_store.h); null: they stay in memory. Throws
+  // std::runtime_error when the options of tags are wrong.
   explicit LoopVerifier(const LoopVerifierOptions& options,
                         std::shared_ptr<RecordStore> records = nullptr)
       : drift_(options.drift),
         aligner_(options.alignment),
         known_(options.redundancy),
-        store_({}, std::move(records)) {}
+        store_({}, std::move(records)) {
+    [[maybe_unused]] const TagSizes checked(options.alignment.tags);
+  }
 
   // Keyframes may come in any order; a repeat is ignored.
   void Add(Keyframe keyframe) { store_.Add(std::move(keyframe)); }

@@ -81,8 +81,8 @@ void AddLandmark(int32_t id, const Estimate& estimate, Window* window) {
   window->landmarks.push_back(std::move(landmark));
 }
 
-// Poses along the edges, which are better than the published poses (keyframe_t.lcm). The axes are
-// those of odom at the newest keyframe, and the origin is there.
+}  // namespace
+
 std::vector<Rigid3> PosesAlongEdges(const KeyframeWindow& frames) {
   std::vector<Rigid3> T_w_body(frames.size());
   T_w_body.back().q = frames.back()->keyframe().T_odom_body.q;
@@ -91,8 +91,6 @@ std::vector<Rigid3> PosesAlongEdges(const KeyframeWindow& frames) {
   }
   return T_w_body;
 }
-
-}  // namespace
 
 KeyframeWindow LastOfWindow(const KeyframeWindow& frames) {
   const KeyframeView& newest = *frames.back();

@@ -76,6 +76,10 @@ struct Window {
   }
 };
 
+// The window frame's T_w_body along the edges, which are better than the published poses
+// (keyframe_t.lcm).
+std::vector<Rigid3> PosesAlongEdges(const KeyframeWindow& frames);
+
 // The last of `frames`: as many as the window of the newest one needs.
 KeyframeWindow LastOfWindow(const KeyframeWindow& frames);
 

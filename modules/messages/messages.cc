@@ -218,7 +218,8 @@ Parsed<PlaceMatch> Parse(const place_match_t& m) {
     if (!matched.value || *matched.value == match.query) {
       return Refused<PlaceMatch>("candidate: invalid keyframe id");
     }
-    if (c.kind != place_candidate_t::KIND_INTRA && c.kind != place_candidate_t::KIND_INTER) {
+    if (c.kind != place_candidate_t::KIND_INTRA && c.kind != place_candidate_t::KIND_INTER &&
+        c.kind != place_candidate_t::KIND_TAG) {
       return Refused<PlaceMatch>("candidate: unknown kind");
     }
     if (!std::isfinite(c.score) || c.num_matches < 0 || c.num_matches > kMaxCorners) {
@@ -250,7 +251,7 @@ Parsed<Constraint> Parse(const constraint_t& m) {
     return Refused<Constraint>("constraint: invalid keyframe ids");
   }
   if (m.kind != place_candidate_t::KIND_INTRA && m.kind != place_candidate_t::KIND_INTER &&
-      m.kind != constraint_t::KIND_DERIVED) {
+      m.kind != constraint_t::KIND_DERIVED && m.kind != place_candidate_t::KIND_TAG) {
     return Refused<Constraint>("constraint: unknown kind");
   }
   if (!T_from_to.value || !covariance) {

@@ -43,8 +43,9 @@ PlaceMatch PlaceRecognition::Add(const Keyframe& keyframe, std::vector<PlaceRepo
   }
   Search(query, own, kOwnMap, &match, report);
   Search(query, others, kOtherMaps, &match, report);
+  AddTagCandidates(keyframe, &match);
   RememberPlaces(match);
-  Store(query);
+  Store(query, keyframe.tags);
   return match;
 }
 
@@ -101,7 +102,7 @@ void PlaceRecognition::Publish(std::vector<PlaceCandidate> verified, int limit, 
 
 void PlaceRecognition::Remember(const Keyframe& keyframe, const PlaceMatch& known) {
   RememberPlaces(known);
-  Store(RecognisedKeyframe(keyframe));
+  Store(RecognisedKeyframe(keyframe), keyframe.tags);
 }
 
 void PlaceRecognition::Save(ByteWriter* writer) {
@@ -112,6 +113,7 @@ void PlaceRecognition::Save(ByteWriter* writer) {
     writer->Put(matches);
   }
   stored_.Save(writer);
+  tags_.Save(writer);
   index_.Save(writer);
 }
 
@@ -127,19 +129,36 @@ bool PlaceRecognition::Restore(ByteReader* reader) {
   }
   StoredKeyframes stored(stored_.records());
   DescriptorIndex index;
-  if (!stored.Restore(reader) || !index.Restore(reader) || stored.size() != index.size() ||
-      !reader->at_end()) {
+  TagSightings tags(kMinSeqGap);
+  const bool has_stored = stored.Restore(reader);
+  tags.Restore(reader);
+  if (!has_stored || !index.Restore(reader) || stored.size() != index.size() || !reader->at_end()) {
     return false;
   }
   counters_ = counters;
   last_matches_ = std::move(last_matches);
   stored_ = std::move(stored);
+  tags_ = std::move(tags);
   index_ = std::move(index);
   return true;
 }
 
-void PlaceRecognition::Store(const RecognisedKeyframe& keyframe) {
+// A pair of keyframes is a candidate once: by the tag, if both see one.
+void PlaceRecognition::AddTagCandidates(const Keyframe& keyframe, PlaceMatch* match) {
+  for (const KeyframeId& place : tags_.Places(keyframe.id, keyframe.tags)) {
+    auto known = std::ranges::find(match->candidates, place, &PlaceCandidate::match);
+    if (known == match->candidates.end()) {
+      known = match->candidates.insert(known, {place, PlaceKind::kTag, 0, {}});
+    }
+    known->kind = PlaceKind::kTag;
+    ++counters_.candidates_tag;
+  }
+}
+
+void PlaceRecognition::Store(const RecognisedKeyframe& keyframe,
+                             const std::vector<TagObservation>& tags) {
   ++counters_.keyframes;
+  tags_.Add(keyframe.id, tags);
   if (index_.size() < options_.max_keyframes && stored_.Add(keyframe)) {
     index_.Add(keyframe.corners);
   }

@@ -8,7 +8,8 @@
 // in all other maps. The best places of each search are checked: corners are matched by descriptor,
 // one relative pose must explain the matches (epipolar_check.h), and this pose guides a second
 // matching. inter_map_ba and fusion verify the candidates, so this module prefers a false candidate
-// to a missed one.
+// to a missed one. A keyframe that sees an AprilTag is a candidate for those that saw it before,
+// whatever the images look like.
 //
 // Deterministic: the same calls in the same order give the same matches. One thread.
 
@@ -24,6 +25,7 @@
 #include "core/server_messages.h"
 #include "place_recognition/descriptor_index.h"
 #include "place_recognition/stored_keyframes.h"
+#include "place_recognition/tag_sightings.h"
 
 namespace pangea {
 
@@ -57,6 +59,7 @@ class PlaceRecognition {
     int64_t places = 0;          // checked by descriptor matching
     int64_t candidates_own = 0;  // published
     int64_t candidates_other = 0;
+    int64_t candidates_tag = 0;
     int64_t rejected_matching = 0;
     int64_t rejected_epipolar = 0;
     int64_t rejected_surplus = 0;
@@ -96,7 +99,7 @@ class PlaceRecognition {
   static constexpr Limits kOwnMap{.places = 5, .continued_places = 2, .candidates = 3};
   static constexpr Limits kOtherMaps{.places = 8, .continued_places = 3, .candidates = 5};
 
-  void Store(const RecognisedKeyframe& keyframe);
+  void Store(const RecognisedKeyframe& keyframe, const std::vector<TagObservation>& tags);
   bool IsRecent(const RecognisedKeyframe& query, int other) const;
   // One hit per run of neighbouring keyframes, best first.
   std::vector<Place> Places(const std::vector<Place>& hits) const;
@@ -112,6 +115,7 @@ class PlaceRecognition {
   std::optional<PlaceCandidate> Verify(const RecognisedKeyframe& query, const Place& place,
                                        PlaceMatch* match, PlaceReport* report);
   void Publish(std::vector<PlaceCandidate> verified, int limit, PlaceMatch* match);
+  void AddTagCandidates(const Keyframe& keyframe, PlaceMatch* match);
   PlaceKind Kind(const MapId& a, const MapId& b) const;
   void RememberPlaces(const PlaceMatch& match);
 
@@ -119,6 +123,7 @@ class PlaceRecognition {
   DescriptorIndex index_;
   StoredKeyframes stored_;                                 // numbered as in index_
   std::map<MapId, std::vector<KeyframeId>> last_matches_;  // by map: matches of its newest keyframe
+  TagSightings tags_{kMinSeqGap};
   GroupStates<GroupMaps> groups_;
   Counters counters_;
 };

@@ -15,7 +15,7 @@
 namespace pangea {
 namespace {
 
-constexpr uint32_t kCheckpointFormat = 4;
+constexpr uint32_t kCheckpointFormat = 5;
 // Bounds: on matches kept for retransmission (beyond it the oldest are dropped), on keyframes that
 // wait in a catch-up or for their turn (beyond it the first are recognised at once), and on the
 // journal's matches that wait for their keyframes (beyond it keyframes are recognised again): as

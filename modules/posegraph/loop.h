@@ -3,7 +3,9 @@
 // A loop closure of the pose graph: an accepted constraint whose two keyframes are both known.
 
 #include <cstdint>
+#include <optional>
 
+#include "core/tags/tag.h"
 #include "posegraph/odometry_chain.h"
 #include "posegraph/solver/four_dof.h"
 
@@ -21,7 +23,10 @@ struct Loop {
   NodeRef to;
   Relative4 relative;
   int num_inliers = 0;
-  bool derived = false;  // made by thinning, in place of constraints that had merged the two maps
+  // For a merge by itself: made by thinning, in place of constraints that had merged the two maps;
+  // or by a tag that both keyframes see.
+  bool sufficient = false;
+  std::optional<TagId> tag;  // of a constraint by a tag
   // Result of the last solve: true if the loop is in force, false if the solve switched it off.
   bool on = true;
 

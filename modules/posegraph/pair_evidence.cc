@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <tuple>
 #include <utility>
@@ -154,7 +155,7 @@ void PairEvidence::Save(ByteWriter* writer) const {
     writer->Put(candidate.node_b);
     Put(candidate.relative, writer);
     writer->Put(candidate.num_inliers);
-    writer->Put(candidate.derived);
+    writer->Put(candidate.sufficient);
     Put(candidate.T_odom_a_odom_b, writer);
     for (const Agreement agreement : candidate.agreement) {
       writer->Put(agreement);
@@ -176,7 +177,7 @@ bool PairEvidence::Restore(ByteReader* reader) {
     reader->Get(&candidate.node_b);
     Get(reader, &candidate.relative);
     reader->Get(&candidate.num_inliers);
-    reader->Get(&candidate.derived);
+    reader->Get(&candidate.sufficient);
     Get(reader, &candidate.T_odom_a_odom_b);
     for (size_t earlier = 0; earlier < i; ++earlier) {
       Agreement agreement{};
@@ -265,7 +266,7 @@ bool PairEvidence::Enough(const std::vector<int>& viewpoints, int rival_viewpoin
   const auto strong = std::ranges::count_if(
       viewpoints, [&](int k) { return candidates_[k].num_inliers >= kStrongInliers; });
   const int count = static_cast<int>(viewpoints.size());
-  if (std::ranges::any_of(agreeing_, [&](int k) { return candidates_[k].derived; })) {
+  if (HasSufficient()) {
     return rival_viewpoints <= kMaxRivalShare * std::max(count, kMinViewpoints + 1);
   }
   if (SceneExtent(viewpoints) < options_.min_scene_extent_m) {
@@ -326,6 +327,18 @@ Pose4 PairEvidence::Alignment() const {
     T.yaw = WrapAngle(T.yaw + step[3]);
   }
   return T;
+}
+
+bool PairEvidence::HasSufficient() const {
+  return std::ranges::any_of(agreeing_, [this](int k) { return candidates_[k].sufficient; });
+}
+
+PairEvidence::AgreeingCandidate PairEvidence::AgreeingNear(int node_a) const {
+  const int k = *std::ranges::min_element(
+      agreeing_, {}, [&](int l) { return std::abs(candidates_[l].node_a - node_a); });
+  const Candidate& near = candidates_[k];
+  return {near.node_a, near.node_b, near.T_odom_a_odom_b,
+          LargestSigma(near.relative.covariance.topLeftCorner<3, 3>())};
 }
 
 // Whether it contradicts more than half of the hypothesis.

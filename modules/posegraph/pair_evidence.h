@@ -11,7 +11,8 @@
 // single viewpoint, and its best rival set is clearly smaller. A merge ends when rivals outweigh
 // what supports it: what undoes it is as much evidence as it rests on. A constraint
 // that thinning derived replaces constraints that once sufficed for a merge, so it counts as
-// sufficient evidence by itself; the test against rivals remains.
+// sufficient evidence by itself; the test against rivals remains. So does one by a tag that both
+// keyframes see: a tag has an identity, and no look-alikes.
 //
 // At most 600 candidates are compared. If these merge the maps, the decision is final, and a later
 // constraint that agrees with all agreeing ones is one of them. If not, the oldest are forgotten.
@@ -52,7 +53,7 @@ class PairEvidence {
     int node_a = 0, node_b = 0;
     Relative4 relative;  // from node_a of map a to node_b of map b
     int num_inliers = 0;
-    bool derived = false;  // as in Loop
+    bool sufficient = false;  // as in Loop
   };
   void Add(const Measurement& measurement);
 
@@ -69,6 +70,16 @@ class PairEvidence {
   const Decision& decision() const { return decision_; }
   // Averaged over the agreeing candidates; only after a decision to merge.
   Pose4 Alignment() const;
+  // Of the agreeing candidate whose keyframe of map a is nearest to this node; only after a
+  // decision to merge.
+  struct AgreeingCandidate {
+    int node_a = 0, node_b = 0;
+    Pose4 T_odom_a_odom_b;
+    double sigma_m = 0;  // of the position, in the worst direction
+  };
+  AgreeingCandidate AgreeingNear(int node_a) const;
+  // Whether an agreeing candidate suffices for a merge by itself.
+  bool HasSufficient() const;
 
   // Samples of the odometry's error, from the agreeing candidates: the candidates are sorted along
   // map a, and candidate i is compared with candidate i + n/2. Each is used at most once, so that a

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <utility>
 
 namespace pangea {
@@ -34,7 +35,17 @@ void PoseGraph::AddKeyframe(const Keyframe& keyframe) {
 }
 
 void PoseGraph::AddConstraint(const Constraint& constraint) {
+  if (!constraint.accepted && constraint.reason == kDifferentTags) {
+    NoteDifferentTags(constraint);
+  }
   constraints_.Add(constraint, [this](const Constraint& one) { return UseConstraint(one); });
+}
+
+void PoseGraph::NoteDifferentTags(const Constraint& constraint) {
+  const auto from = maps_.Number(constraint.from.map), to = maps_.Number(constraint.to.map);
+  if (from && to && *from != *to && pairs_.NoteDifferentTags(*from, *to, constraint.Id(), maps_)) {
+    groups_.Regroup(pairs_);
+  }
 }
 
 bool PoseGraph::UseConstraint(const Constraint& constraint) {
@@ -43,7 +54,9 @@ bool PoseGraph::UseConstraint(const Constraint& constraint) {
   if (!from || !to) {
     return false;
   }
-  const Loop& loop = loops_.Add(MakeLoop(constraint, *from, *to, maps_));
+  Loop made = MakeLoop(constraint, *from, *to, maps_);
+  made.sufficient = made.sufficient && !(made.tag && MovedTags().contains(*made.tag));
+  const Loop& loop = loops_.Add(made);
   if (!loop.intra() && pairs_.Add(loop, maps_)) {
     groups_.Regroup(pairs_);
     restored_ &= IsUsed(loop);  // a separation shows that the restored solution is wrong
@@ -181,6 +194,21 @@ std::vector<int64_t> PoseGraph::InForce() const {
   }
   std::ranges::sort(ids);
   return ids;
+}
+
+std::set<TagId> PoseGraph::MovedTags() const {
+  constexpr int kMinRejected = 2;
+  std::map<TagId, int> rejected;
+  for (const Loop* loop : loops_.ByTags()) {
+    rejected[*loop->tag] += !loop->on && IsUsed(*loop) ? 1 : 0;
+  }
+  std::set<TagId> moved;
+  for (const auto& [tag, count] : rejected) {
+    if (count >= kMinRejected) {
+      moved.insert(tag);
+    }
+  }
+  return moved;
 }
 
 PoseGraph::Counters PoseGraph::counters() const {

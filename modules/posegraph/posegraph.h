@@ -21,6 +21,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "core/byte_record.h"
@@ -63,7 +64,8 @@ class PoseGraph {
   void AddMap(const MapId& map) { NumberOf(map); }
   // Ignores a repeat, and a keyframe older than the newest one of its map.
   void AddKeyframe(const Keyframe& keyframe);
-  // Ignores a repeat and a refused constraint. A constraint on an unknown keyframe waits for it
+  // Ignores a repeat and a refused constraint, unless tags contradict it: then its maps are
+  // probably look-alikes. A constraint on an unknown keyframe waits for it
   // (graph/received_constraints.h says how many may wait).
   void AddConstraint(const Constraint& constraint);
   // Adds a group's state after bundle adjustment (publication/refinement.h). Ignores a repeat, an
@@ -86,6 +88,9 @@ class PoseGraph {
   bool Restore(ByteReader* reader);
 
   Counters counters() const;
+  // The tags that seem to have been moved: the solve rejects constraints by them. They no longer
+  // merge maps by themselves.
+  std::set<TagId> MovedTags() const;
   // Ids of the constraints in force after the last solves, ascending.
   std::vector<int64_t> InForce() const;
   // One metre of the map's odometry is exp(LogScale) metres in the solution; 0 for a metric map.
@@ -95,6 +100,7 @@ class PoseGraph {
 
  private:
   int NumberOf(const MapId& map);
+  void NoteDifferentTags(const Constraint& constraint);
   // False if one of its keyframes is unknown.
   bool UseConstraint(const Constraint& constraint);
   GroupOptimiser Optimiser() { return {options_, pairs_, &maps_, &loops_}; }

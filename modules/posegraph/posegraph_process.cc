@@ -12,8 +12,18 @@
 namespace pangea {
 namespace {
 
-constexpr uint32_t kCheckpointFormat = 6;
+constexpr uint32_t kCheckpointFormat = 7;
 constexpr int64_t kSecond = 1'000'000;
+
+// For people.
+std::string NoteMoved(const std::set<TagId>& tags) {
+  std::string note;
+  for (const TagId& tag : tags) {
+    note += note.empty() ? "; moved, and no longer trusted: tag " : ", ";
+    note += ToString(tag);
+  }
+  return note;
+}
 
 }  // namespace
 
@@ -174,8 +184,9 @@ void PoseGraphProcess::PublishStatus(int64_t now_utime) {
           (num_finished_ != num_arrived_ ? 1 : 0),
       counters.maps == 0
           ? "no keyframes yet"
-          : fmt::format("{} maps in {} groups, {} constraints in force, {} switched off",
-                        counters.maps, counters.groups, counters.in_force, counters.switched_off));
+          : fmt::format("{} maps in {} groups, {} constraints in force, {} switched off{}",
+                        counters.maps, counters.groups, counters.in_force, counters.switched_off,
+                        NoteMoved(graph_.MovedTags())));
 }
 
 }  // namespace pangea

@@ -9,6 +9,9 @@
 
 namespace pangea {
 
+// Constraint::reason of a candidate whose alignment puts different tags at one place.
+inline constexpr char kDifferentTags[] = "different tags at one place";
+
 struct TagPlace {
   Eigen::Vector3d p = Eigen::Vector3d::Zero();
   double sigma_m = 0;  // in the worst direction

@@ -12,6 +12,7 @@
 #include "loop_verification/steps/acceptance.h"
 #include "loop_verification/steps/first_guess.h"
 #include "loop_verification/steps/gravity.h"
+#include "loop_verification/steps/tags.h"
 #include "loop_verification/steps/views.h"
 #include "loop_verification/steps/visibility_check.h"
 
@@ -25,7 +26,8 @@ struct LoopVerificationOptions : CommonStepOptions,
                                  VisibilityOptions,
                                  InlierOptions,
                                  CertaintyOptions,
-                                 HalvesOptions {
+                                 HalvesOptions,
+                                 TagOptions {
   template <typename Archive>
   void Visit(Archive& archive) {
     CommonStepOptions::Visit(archive);
@@ -36,6 +38,7 @@ struct LoopVerificationOptions : CommonStepOptions,
     InlierOptions::Visit(archive);
     CertaintyOptions::Visit(archive);
     HalvesOptions::Visit(archive);
+    TagOptions::Visit(archive);
   }
 };
 
@@ -61,8 +64,18 @@ inline constexpr VerificationStep kVerificationSteps[] = {
     {"gate of the kind, adjusted", Run<CheckDrift>},
     {"inliers", Run<CheckInliers>},
     {"certainty", Run<CheckCertainty>},
+    {"other tags", Run<CheckOtherTags>},
     {"visibility along the way", Run<CheckWiderVisibility>},
     {"halves of the view", Run<CheckHalves>},
+};
+
+// Of a candidate that both keyframes see a tag: no other landmark is used.
+inline constexpr VerificationStep kTagSteps[] = {
+    {"tags", Run<AlignTags>},
+    {"gate of the kind", Run<CheckDrift>},
+    {"gravity", Run<CheckGravity>},
+    {"certainty", Run<CheckTagCertainty>},
+    {"other tags", Run<CheckOtherTags>},
 };
 
 }  // namespace pangea

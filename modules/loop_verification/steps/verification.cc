@@ -43,7 +43,9 @@ std::vector<PointObservation> Verification::Observations(const std::vector<Point
 }
 
 double Verification::inlier_ratio() const {
-  return static_cast<double>(ba->num_inlier_observations) / static_cast<double>(matches.size());
+  return matches.empty() ? 1
+                         : static_cast<double>(ba->num_inlier_observations) /
+                               static_cast<double>(matches.size());
 }
 
 std::vector<PointMatch> Verification::InlierMatches() const {

@@ -87,7 +87,7 @@ struct Verification {
   std::vector<PointObservation> Observations(const std::vector<PointMatch>& of) const;
   // The present alignment of the windows: the adjusted one, once there is one.
   const Rigid3& T_m_c() const { return ba ? ba->T_m_c : pose.T_m_c; }
-  // Share of inliers among the matches that the BA used.
+  // Share of inliers among the matches that the BA used; 1 if tags alone were used.
   double inlier_ratio() const;
   std::vector<PointMatch> InlierMatches() const;
 };

@@ -7,6 +7,8 @@
 namespace pangea {
 namespace {
 
+constexpr TagId kNoTag{TagFamily::k36h11, -1};  // in records
+
 void Put(const NodeRef& node, ByteWriter* writer) {
   writer->Put(node.map);
   writer->Put(node.node);
@@ -27,7 +29,10 @@ Loop MakeLoop(const Constraint& constraint, NodeRef from, NodeRef to, const Grap
   loop.from = from;
   loop.to = to;
   loop.num_inliers = constraint.num_inliers;
-  loop.derived = constraint.kind == PlaceKind::kDerived;
+  if (constraint.kind == PlaceKind::kTag) {
+    loop.tag = MapTags::Common(maps[from.map].tags, from.node, maps[to.map].tags, to.node);
+  }
+  loop.sufficient = constraint.kind == PlaceKind::kDerived || loop.tag.has_value();
   loop.relative =
       MakeRelative4(constraint.T_from_to, constraint.covariance, node_from.T_odom_body.q,
                     node_from.roll_pitch_covariance, node_to.T_odom_body.q);
@@ -44,6 +49,17 @@ void GraphLoops::Index(int loop) {
   const auto map = static_cast<size_t>(loops_[loop].from.map);
   from_.resize(std::max(from_.size(), map + 1));
   from_[map].push_back(loop);
+  if (loops_[loop].tag) {
+    by_tags_.push_back(loop);
+  }
+}
+
+std::vector<const Loop*> GraphLoops::ByTags() const {
+  std::vector<const Loop*> loops;
+  for (const int loop : by_tags_) {
+    loops.push_back(&loops_[loop]);
+  }
+  return loops;
 }
 
 std::vector<int> GraphLoops::NumbersAmong(const std::vector<int>& maps) const {
@@ -84,7 +100,10 @@ void GraphLoops::Save(ByteWriter* writer) const {
     Put(loop.to, writer);
     Put(loop.relative, writer);
     writer->Put(loop.num_inliers);
-    writer->Put(loop.derived);
+    writer->Put(loop.sufficient);
+    const TagId tag = loop.tag.value_or(kNoTag);
+    writer->Put(tag.family);
+    writer->Put(tag.id);
     writer->Put(loop.on);
   }
 }
@@ -97,7 +116,11 @@ bool GraphLoops::Restore(ByteReader* reader, const GraphMaps& maps) {
     Get(reader, &loop.to);
     Get(reader, &loop.relative);
     reader->Get(&loop.num_inliers);
-    reader->Get(&loop.derived);
+    reader->Get(&loop.sufficient);
+    TagId tag;
+    reader->Get(&tag.family);
+    reader->Get(&tag.id);
+    loop.tag = tag == kNoTag ? std::nullopt : std::optional(tag);
     reader->Get(&loop.on);
     if (!maps.Contains(loop.from) || !maps.Contains(loop.to)) {
       return false;

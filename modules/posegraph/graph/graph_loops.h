@@ -28,6 +28,9 @@ class GraphLoops {
   std::vector<const Loop*> Among(const std::vector<int>& maps) const;
   std::vector<Loop*> Among(const std::vector<int>& maps);
 
+  // The loops by a tag, in order of arrival.
+  std::vector<const Loop*> ByTags() const;
+
   void Save(ByteWriter* writer) const;
   // Call on an empty object. False if the bytes are not those of loops of `maps`.
   bool Restore(ByteReader* reader, const GraphMaps& maps);
@@ -38,6 +41,7 @@ class GraphLoops {
 
   std::deque<Loop> loops_;
   std::vector<std::vector<int>> from_;  // by map: indices of the loops that begin in it
+  std::vector<int> by_tags_;            // indices of the loops by a tag
 };
 
 }  // namespace pangea

@@ -38,7 +38,7 @@ TEST(MakeLoop, HasTheConstraintInTheOdomAxesOfItsFirstKeyframe) {
   constraint.T_from_to = {YawRotation(-EIGEN_PI / 2), {1, 0, 0}};
   const Loop loop = MakeLoop(constraint, {0, 1}, {1, 0}, maps);
   EXPECT_EQ(loop.id, constraint.Id());
-  EXPECT_TRUE(loop.derived);
+  EXPECT_TRUE(loop.sufficient);
   EXPECT_FALSE(loop.intra());
   EXPECT_EQ(loop.num_inliers, 60);
   EXPECT_LT((loop.relative.t - Eigen::Vector3d(0, 1, 0)).norm(), 1e-12);

@@ -10,7 +10,9 @@ bool GraphMap::Add(const Keyframe& keyframe) {
   if (!chain.Add(keyframe)) {
     return false;
   }
-  poses.push_back(PoseOf(static_cast<int>(chain.size()) - 1));
+  const int node = static_cast<int>(chain.size()) - 1;
+  poses.push_back(PoseOf(node));
+  tags.Add(node, keyframe);
   known_revision = std::max(known_revision, keyframe.group_revision);
   return true;
 }
@@ -59,6 +61,7 @@ void GraphMaps::Save(ByteWriter* writer) const {
   for (const GraphMap& map : maps_) {
     writer->Put(map.id);
     map.chain.Save(writer);
+    map.tags.Save(writer);
     writer->PutCount(map.poses.size());
     for (const Pose4& pose : map.poses) {
       Put(pose, writer);
@@ -78,6 +81,7 @@ bool GraphMaps::Restore(ByteReader* reader) {
     reader->Get(&map.id);
     numbers_.emplace(map.id, number++);
     const bool is_chain = map.chain.Restore(reader);
+    map.tags.Restore(reader);
     map.poses.resize(reader->GetCount(1));
     for (Pose4& pose : map.poses) {
       Get(reader, &pose);

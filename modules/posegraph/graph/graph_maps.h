@@ -13,6 +13,7 @@
 
 #include "core/byte_record.h"
 #include "core/keyframe.h"
+#include "posegraph/graph/map_tags.h"
 #include "posegraph/loop.h"
 #include "posegraph/odometry_chain.h"
 #include "posegraph/solver/four_dof.h"
@@ -22,6 +23,7 @@ namespace pangea {
 struct GraphMap {
   MapId id;
   OdometryChain chain;
+  MapTags tags;
   std::vector<Pose4> poses;  // of each node, in the map frame
   Pose4 T_map_odom;
   double log_scale = 0;  // p_map = T_map_odom * (exp(log_scale) p_odom)

@@ -62,7 +62,7 @@ inline Loop LoopBetween(NodeRef from, NodeRef to, const Pose4& T, const GraphMap
 // A derived loop: one alone suffices to merge its two maps.
 inline Loop DerivedLoopBetween(NodeRef from, NodeRef to, const Pose4& T, const GraphMaps& maps) {
   Loop loop = LoopBetween(from, to, T, maps);
-  loop.derived = true;
+  loop.sufficient = true;
   return loop;
 }
 

@@ -68,8 +68,9 @@ void GroupProblem::AddLoops() {
     const SolvedMap& from = solved_.at(loop->from.map);
     const SolvedMap& to = solved_.at(loop->to.map);
     // Loops between maps are metric: verification has accounted for the scales in their covariance.
+    // So are those by a tag, whose size is known if the map is not metric (tag_alignment.h).
     solver_.AddLoop(from.offset + loop->from.node, to.offset + loop->to.node, loop->relative,
-                    loop->on, loop->intra() ? from.scale : GroupSolver::kMetric);
+                    loop->on, loop->intra() && !loop->tag ? from.scale : GroupSolver::kMetric);
   }
 }
 

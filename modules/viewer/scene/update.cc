@@ -214,15 +214,16 @@ class Update {
     const auto end = [&](const KeyframeId& id) {
       return json{scene_.MapIndex(id.map).value_or(-1), id.seq};
     };
-    json_["constraints"].push_back({{"index", index},
-                                    {"from", end(constraint.from)},
-                                    {"to", end(constraint.to)},
-                                    {"inter", constraint.kind == PlaceKind::kInter},
-                                    {"accepted", constraint.accepted},
-                                    {"reason", constraint.reason},
-                                    {"inliers", constraint.num_inliers},
-                                    {"inlier_ratio", Rounded(constraint.inlier_ratio)},
-                                    {"rms_px", Rounded(constraint.rms_px)}});
+    json_["constraints"].push_back(
+        {{"index", index},
+         {"from", end(constraint.from)},
+         {"to", end(constraint.to)},
+         {"inter", constraint.kind == PlaceKind::kInter || constraint.kind == PlaceKind::kTag},
+         {"accepted", constraint.accepted},
+         {"reason", constraint.reason},
+         {"inliers", constraint.num_inliers},
+         {"inlier_ratio", Rounded(constraint.inlier_ratio)},
+         {"rms_px", Rounded(constraint.rms_px)}});
   }
 
   void AddProcess(const SceneProcess& process) {
