@@ -162,6 +162,36 @@ TEST_F(SiteProgram, DeletesWhatIsNamed) {
   EXPECT_FALSE(fs::exists(site));
 }
 
+// The server does not start, and the site stays as it was.
+TEST_F(SiteProgram, RefusesAWrongFileOfTags) {
+  ASSERT_EQ(Site("create " + site).exit_code, 0);
+  const fs::path file = fs::path(site) / "tags.yaml";
+  std::ofstream(file) << "tags:\n- {ids: 0-19, size_m: 0.16}\n- {ids: 7, size_m: 0.4}\n";
+  for (const std::string command :
+       {"pangea-server --site " + site, "pangea-site tags " + file.string(),
+        "pangea-fusion --tags " + file.string()}) {
+    const Outcome refused = RunCommand(command);
+    EXPECT_NE(refused.exit_code, 0) << command;
+    EXPECT_THAT(refused.output, HasSubstr("tags.yaml: tags[1].ids: 7 is there twice"));
+  }
+  EXPECT_FALSE(fs::exists(fs::path(site) / "journal.lcm"));
+  std::ofstream(file) << "tags:\n- {ids: 0-19, size_m: 0.16}\n";
+  const Outcome checked = RunCommand("pangea-site tags " + file.string());
+  EXPECT_EQ(checked.exit_code, 0);
+  EXPECT_THAT(checked.output, HasSubstr("20 tags"));
+}
+
+TEST_F(SiteProgram, PrintsATagOnce) {
+  const fs::path sheet = folder / "tag.svg";
+  const std::string command =
+      "pangea-site tags --print " + sheet.string() + " --id 7 --size-mm 120";
+  const Outcome printed = RunCommand(command);
+  EXPECT_EQ(printed.exit_code, 0) << printed.output;
+  EXPECT_THAT(printed.output, HasSubstr("{ids: 7, size_m: 0.12}"));
+  EXPECT_THAT(ReadFile(sheet), HasSubstr("36h11:7"));
+  EXPECT_NE(RunCommand(command).exit_code, 0) << "nothing is overwritten";
+}
+
 TEST_F(SiteProgram, SaysWhatIsWrongWithACommand) {
   EXPECT_THAT(Site("info " + site).output, HasSubstr("is no site: it has no site.yaml"));
   EXPECT_THAT(Site("list " + site).output, HasSubstr("is no folder"));

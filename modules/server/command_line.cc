@@ -13,6 +13,7 @@
 #include "options/command_line.h"
 #include "server/server.h"
 #include "site/site.h"
+#include "tags/tag_file.h"
 #include "web/web_rules.h"
 
 namespace pangea::server {
@@ -135,6 +136,10 @@ void UseSite(site::Site site, Arguments* arguments) {
   options.keys = site.keys();
   options.logs = site.logs();
   options.checkpoints = site.checkpoints();
+  if (fs::exists(site.tags())) {
+    ReadTagFile(site.tags());  // a wrong one is told at once
+    options.tags = site.tags();
+  }
   arguments->options_folder = site.options();
   options.bus = options.bus.empty() ? site.description.bus : options.bus;
   options.link = options.link.empty() ? site.description.link : options.link;

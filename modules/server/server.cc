@@ -56,6 +56,9 @@ std::vector<std::string> Command(const std::string& process, const ServerSetup& 
   if (std::ranges::find(kVerifiers, process) != std::end(kVerifiers)) {
     argv.insert(argv.end(), {"--threads", std::to_string(options.threads)});
   }
+  if (process == "fusion" && !options.tags.empty()) {
+    argv.insert(argv.end(), {"--tags", options.tags.string()});
+  }
   if (process == "anchors" && !options.http.empty()) {
     argv.insert(argv.end(), {"--http", options.http});
     for (const std::string& origin : options.origins) {

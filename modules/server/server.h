@@ -30,6 +30,7 @@ struct ServerSetup {
   std::optional<uint16_t> phone_port;
   std::filesystem::path site;
   std::map<std::string, std::filesystem::path> options;  // options file by process
+  std::filesystem::path tags;                            // the site's tags.yaml; empty: none
   int threads = 1;                                       // of each verifier
   ClusterOptions cluster;
 };

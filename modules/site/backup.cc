@@ -62,6 +62,9 @@ std::vector<Source> SourcesOf(const Site& site, bool with_keys, const WholePart&
       sources.push_back(SourceOf(file, folder + file.filename().string()));
     }
   };
+  if (fs::exists(site.tags())) {
+    add({site.tags()}, "");
+  }
   add(OptionFiles(site), "options/");
   add(GatewayAgentFiles(site), "gateway/agents/");
   if (with_keys) {

@@ -11,6 +11,7 @@
 #include <string>
 
 #include "bus/process.h"
+#include "files/whole_file.h"
 #include "log_file/log_reading.h"
 #include "options/command_line.h"
 #include "site/backup.h"
@@ -21,6 +22,8 @@
 #include "site/site_export.h"
 #include "site/site_info.h"
 #include "site/site_options.h"
+#include "tags/tag_file.h"
+#include "tags/tag_sheet.h"
 
 namespace pangea::site {
 namespace {
@@ -168,6 +171,55 @@ void RunDelete(const Arguments& arguments) {
                                            site.folder.string(), away.string()));
 }
 
+void CheckTags(const std::string& file) {
+  const TagSizes sizes(ReadTagFile(file));
+  std::cout << fmt::format("{}: {} tags\n", file, sizes.all().size());
+}
+
+void PrintTag(const std::string& out, int id, double size_mm) {
+  const TagId tag{TagFamily::k36h11, id};
+  constexpr mode_t kReadable = 0644;
+  if (!WriteNewFile(out, TagSheet(tag, size_mm), kReadable)) {
+    throw std::runtime_error(out + ": exists already");
+  }
+  std::cout << fmt::format(
+      "{}: tag {}; print it at 100 %, and put into tags.yaml: {{ids: {}, size_m: {:g}}}\n", out,
+      ToString(tag), id, 1e-3 * size_mm);
+}
+
+struct TagArguments {
+  std::string file, out;
+  int id = 0;
+  double size_mm = kMaxSheetTag_mm;
+};
+
+void AddTags(CLI::App& app) {
+  const auto arguments = std::make_shared<TagArguments>();
+  CLI::App* tags = app.add_subcommand(
+      "tags", "Checks a site's tags.yaml, or draws an AprilTag to print (docs/tags.md)");
+  CLI::Option* file =
+      tags->add_option("file", arguments->file, "tags.yaml")->check(CLI::ExistingFile);
+  CLI::Option* print =
+      tags->add_option("--print", arguments->out, "New FILE.svg: an A4 page")->excludes(file);
+  tags->add_option("--id", arguments->id, "Of the tag, family 36h11")
+      ->check(CLI::Range(0, NumTagIds(TagFamily::k36h11) - 1))
+      ->capture_default_str()
+      ->needs(print);
+  tags->add_option("--size-mm", arguments->size_mm, "Side of the black square")
+      ->check(Within(10, kMaxSheetTag_mm))
+      ->capture_default_str()
+      ->needs(print);
+  tags->callback([arguments] {
+    if (!arguments->out.empty()) {
+      PrintTag(arguments->out, arguments->id, arguments->size_mm);
+    } else if (!arguments->file.empty()) {
+      CheckTags(arguments->file);
+    } else {
+      throw std::runtime_error("tags: give a tags.yaml, or --print FILE.svg");
+    }
+  });
+}
+
 CLI::App* AddSiteCommand(CLI::App& app, const std::string& name, const std::string& help,
                          const Shared& arguments) {
   CLI::App* command = app.add_subcommand(name, help);
@@ -259,6 +311,7 @@ void AddCommands(CLI::App& app, LogReadings* readings, bool* lost) {
   AddReading(app, arguments, readings);
   AddMaking(app, arguments);
   AddChanging(app, arguments);
+  AddTags(app);
 }
 
 }  // namespace

@@ -207,6 +207,9 @@ MergeSummary MergeSites(const Site& first, const Site& second, const fs::path& o
   fs::permissions(made_site.keys(), fs::perms::owner_all);
   fs::create_directories(made_site.options());
   CopyOptions(first, made_site.options());
+  if (fs::exists(first.tags())) {
+    fs::copy_file(first.tags(), made_site.tags());
+  }
   CopyAgents({first, second}, made_site.gateway() / "agents");
   if (options.with_keys) {
     CopyKeys(first, made_site.keys());

@@ -33,7 +33,7 @@ constexpr size_t kMaxName = 100;
 bool IsOurs(const std::string& name) {
   return std::ranges::find(kFolders, name) != std::end(kFolders) || name == "lock" ||
          name == "checkpoint" || name == "gateway" || name == "recordings" || name == "site.yaml" ||
-         name == "site.yaml.new" || name.starts_with("journal.lcm");
+         name == "tags.yaml" || name == "site.yaml.new" || name.starts_with("journal.lcm");
 }
 
 void CheckDescription(const fs::path& file, const SiteDescription& description) {

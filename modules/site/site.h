@@ -6,6 +6,7 @@
 //   journal.lcm   the map (agent_handler writes it)
 //   keys/         a key for each agent that may join; mode 0700
 //   options/      <process>.yaml
+//   tags.yaml     the sizes of its AprilTags, if there are any (docs/tags.md)
 //   logs/         what the server's processes print
 //   checkpoint/   checkpoints of the server's processes; without them they read the whole journal
 //   gateway/      data of pangea-gateway (its admission.h, identity.h); mode 0700
@@ -46,6 +47,7 @@ struct Site {
   std::filesystem::path journal() const { return folder / "journal.lcm"; }
   std::filesystem::path keys() const { return folder / "keys"; }
   std::filesystem::path options() const { return folder / "options"; }
+  std::filesystem::path tags() const { return folder / "tags.yaml"; }
   std::filesystem::path logs() const { return folder / "logs"; }
   std::filesystem::path checkpoints() const { return folder / "checkpoint"; }
   std::filesystem::path gateway() const { return folder / "gateway"; }

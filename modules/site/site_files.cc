@@ -74,9 +74,10 @@ bool IsFileOfSite(const std::string& name) {
     return name.starts_with(folder) && name.ends_with(extension) &&
            IsPlainName(name.substr(folder.size()));
   };
-  return name == "site.yaml" || name == "journal.lcm" || is_in("keys/", ".key") ||
-         is_in("options/", ".yaml") || is_in("gateway/agents/", ".json") ||
-         is_in("gateway/", ".key") || is_in("gateway/", ".pem");
+  return name == "site.yaml" || name == "tags.yaml" || name == "journal.lcm" ||
+         is_in("keys/", ".key") || is_in("options/", ".yaml") ||
+         is_in("gateway/agents/", ".json") || is_in("gateway/", ".key") ||
+         is_in("gateway/", ".pem");
 }
 
 WholePart FindWholePart(const Site& site) {
