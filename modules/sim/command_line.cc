@@ -5,8 +5,10 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <map>
+#include <optional>
 #include <stdexcept>
 
+#include "core/tags/tag.h"
 #include "files/progress.h"
 #include "options/command_line.h"
 #include "sim/recording.h"
@@ -50,6 +52,8 @@ class CommandLine {
   std::string generate_ = "walk";
   std::string scene_ = "hall";
   std::string camera_ = "euroc";
+  std::optional<int> first_tag_;
+  double tag_size_m_ = WallTags{}.size_m;
   double shrink_ = 1;
   double knot_spacing_s_ = 0;
   double exposure_ms_ = 3;
@@ -120,6 +124,16 @@ void CommandLine::AddScene(CLI::App& app) {
   app.add_option("--scene-seed", options_.scene.seed, "changes everything in the scene")
       ->capture_default_str()
       ->group(group);
+  auto* tags =
+      app.add_option("--tags", first_tag_,
+                     "AprilTags (36h11) every 1.5 m along the walls, with ids from this on")
+          ->check(CLI::Range(0, NumTagIds(TagFamily::k36h11) - 1))
+          ->group(group);
+  app.add_option("--tag-size", tag_size_m_, "side of their black square, m")
+      ->check(Within(0.02, 2))
+      ->capture_default_str()
+      ->needs(tags)
+      ->group(group);
   app.add_option("--keep-clear", options_.keep_clear_files,
                  "further paths the scene must hold and stay clear of. A scene is built around "
                  "--path and these, so recordings of one scene need the same set, in any order")
@@ -177,6 +191,9 @@ void CommandLine::Apply() {
     options_.generated.duration_s = options_.start_s + duration + kMargins;
   }
   options_.scene.kind = kScenes.at(scene_);
+  if (first_tag_) {
+    options_.scene.tags = {.first_id = *first_tag_, .size_m = tag_size_m_};
+  }
   options_.camera = CameraOf(camera_);
   if (shrink_ > 1) {
     options_.camera = Shrunk(options_.camera, shrink_);

@@ -60,6 +60,12 @@ uint64_t FrameKey(const SceneOptions& scene, const SplinePath& path, const Camer
   for (const Eigen::Vector3d& point : scene.keep_clear) {
     hash = HashBytes(point.data(), 3 * sizeof(double), hash);
   }
+  if (scene.tags) {
+    for (const double value : {static_cast<double>(scene.tags->first_id), scene.tags->size_m,
+                               scene.tags->every_m, scene.tags->height_m}) {
+      hash = HashValue(value, hash);
+    }
+  }
   return hash;
 }
 

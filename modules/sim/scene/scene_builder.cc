@@ -276,6 +276,9 @@ Scene BuildScene(const SceneOptions& options) {
     clad.AddPart(part, bare ? Marks::kFew : Marks::kMany, &scene);
   }
   clad.Paint(IsHall(options.kind) ? 4096 : 2048, &scene);
+  if (options.tags) {
+    AddTags(*options.tags, &scene);
+  }
   return scene;
 }
 

@@ -6,10 +6,12 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "sim/scene/scene.h"
+#include "sim/scene/wall_tags.h"
 
 namespace pangea::sim {
 
@@ -31,6 +33,7 @@ struct SceneOptions {
   // Factor on the size of a texel: above 1 the scene is built faster, but near surfaces look
   // blurred.
   double coarseness = 1.0;
+  std::optional<WallTags> tags;
 };
 
 Scene BuildScene(const SceneOptions& options);
