@@ -97,7 +97,7 @@ def found(roots, suffixes):
 # Largest numbers of words, without tables' lines, or lists would replace them: what one can read at one sitting, or what fits on a page.
 LONGEST = {"README.md": 900, "bench/README.md": 2900, "docs/decisions/*.md": 420}
 ALL_PAGES = ["README.md", "docs/*.md", "docs/decisions/*.md", "bench/README.md", "lcmtypes/README.md", "logs/README.md"]
-MOST_WORDS = 25700
+MOST_WORDS = 25850
 
 
 def words_of(pattern):
