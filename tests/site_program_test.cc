@@ -167,7 +167,7 @@ TEST_F(SiteProgram, RefusesAWrongFileOfTags) {
   ASSERT_EQ(Site("create " + site).exit_code, 0);
   const fs::path file = fs::path(site) / "tags.yaml";
   std::ofstream(file) << "tags:\n- {ids: 0-19, size_m: 0.16}\n- {ids: 7, size_m: 0.4}\n";
-  for (const std::string command :
+  for (const std::string& command :
        {"pangea-server --site " + site, "pangea-site tags " + file.string(),
         "pangea-fusion --tags " + file.string()}) {
     const Outcome refused = RunCommand(command);
