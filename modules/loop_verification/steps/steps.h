@@ -69,7 +69,7 @@ inline constexpr VerificationStep kVerificationSteps[] = {
     {"halves of the view", Run<CheckHalves>},
 };
 
-// Of a candidate that both keyframes see a tag: no other landmark is used.
+// Of a candidate by a tag that both keyframes see: no other landmark is used.
 inline constexpr VerificationStep kTagSteps[] = {
     {"tags", Run<AlignTags>},
     {"gate of the kind", Run<CheckDrift>},

@@ -7,7 +7,8 @@
 // over T_m_c, the pose of each tag in window frame m and its size, and the scale of each window's
 // odometry. A tag has the same size in both windows, so it does not have to be known. The keyframes
 // of a window are not variables: the errors of the odometry between them are part of the corners'
-// covariance, to first order. So are only the errors of the corners in one window correlated.
+// covariance, to first order. So the corners of one window have
+// correlated errors, those of different windows do not.
 
 #include <array>
 #include <optional>
@@ -60,7 +61,7 @@ class TagProblem {
              std::vector<SizePrior> sizes)
       : windows_(std::move(windows)), views_(std::move(views)), sizes_(std::move(sizes)) {}
 
-  // Residuals in units of their sigmas; the corners' are not yet decorrelated: Whiten does.
+  // Residuals in units of their sigmas; those of the corners are pixels: Solve whitens them.
   // `jacobian` may be null. Columns: T_m_c (6), T_m_tag (6 each), log sizes, log scales. Nothing if
   // a corner lies behind a camera.
   std::optional<Eigen::VectorXd> Residuals(const TagEstimate& at, Eigen::MatrixXd* jacobian) const;
