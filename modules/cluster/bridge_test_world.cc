@@ -7,6 +7,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <random>
 #include <stdexcept>
 #include <thread>
 
@@ -43,18 +44,25 @@ PlaceKind KindOf(int candidate) {
 
 }  // namespace
 
+// Below the ports that Linux gives to clients: while nats-server is down, no other program gets its
+// port, and no client that connects again can connect to itself.
 int FreePort() {
-  const int fd = socket(AF_INET, SOCK_STREAM, 0);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  socklen_t size = sizeof address;
-  if (bind(fd, reinterpret_cast<sockaddr*>(&address), size) != 0) {
-    throw std::runtime_error("no port is free");
+  constexpr int kFirst = 20'000, kCount = 12'000;
+  std::mt19937 random{std::random_device{}()};
+  for (int i = 0; i < 100; ++i) {
+    const int port = kFirst + static_cast<int>(random() % kCount);
+    const int fd = socket(AF_INET, SOCK_STREAM, 0);
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    address.sin_port = htons(static_cast<uint16_t>(port));
+    const bool is_free = bind(fd, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0;
+    close(fd);
+    if (is_free) {
+      return port;
+    }
   }
-  getsockname(fd, reinterpret_cast<sockaddr*>(&address), &size);
-  close(fd);
-  return ntohs(address.sin_port);
+  throw std::runtime_error("no port is free");
 }
 
 std::string NatsServerProgram() {
@@ -76,7 +84,8 @@ void NatsServer::Start() {
   program_ = std::make_unique<Program>(
       std::vector<std::string>{NatsServerProgram(), "-a", "127.0.0.1", "-p", std::to_string(port_),
                                "-js", "-sd", store_.string(), "-l", store_.string() + ".log"});
-  for (int i = 0; i < 100; ++i) {
+  const auto end = std::chrono::steady_clock::now() + 20s;
+  while (std::chrono::steady_clock::now() < end) {
     try {
       NatsClient(access_, "test");
       return;

@@ -69,6 +69,8 @@ NatsOwned<natsOptions> OptionsOf(const NatsAccess& access, const std::string& na
   NatsOwned<natsOptions> options(made);
   natsOptions_SetName(made, name.c_str());
   natsOptions_SetTimeout(made, timeout_ms);
+  // Without it a write to a host that is gone blocks, and libnats' check of its pings with it.
+  natsOptions_SetWriteDeadline(made, timeout_ms);
   natsOptions_SetErrorHandler(made, SayWhatIsRefused, nullptr);
   natsOptions_SetMaxReconnect(made, -1);
   natsOptions_SetReconnectWait(made, kReconnectWait_ms);
