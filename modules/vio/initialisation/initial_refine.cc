@@ -169,6 +169,13 @@ std::optional<RefinedStart> RefineInFront(const RefineFrom& refine, LinearStart*
   return refined;
 }
 
+std::optional<MovingStart> BetterOf(std::optional<MovingStart> a, std::optional<MovingStart> b) {
+  const auto cost = [](const std::optional<MovingStart>& start) {
+    return start && start->refined ? start->refined->cost : std::numeric_limits<double>::infinity();
+  };
+  return cost(b) < cost(a) || !a ? std::move(b) : std::move(a);
+}
+
 RefinedStart BestOfScales(const RefineFrom& refine, const LinearStart& start, RefinedStart first) {
   RefinedStart best = std::move(first);
   for (const double scale : kOtherScales) {

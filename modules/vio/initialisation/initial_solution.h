@@ -92,6 +92,15 @@ using RefineFrom = std::function<std::optional<RefinedStart>(const LinearStart&)
 // replaced by its mirror image, and that is refined.
 std::optional<RefinedStart> RefineInFront(const RefineFrom& refine, LinearStart* start);
 
+// A start from one gyro bias.
+struct MovingStart {
+  RefineFrom refine;
+  LinearStart linear;
+  std::optional<RefinedStart> refined;
+};
+// The one whose refinement has the lower cost.
+std::optional<MovingStart> BetterOf(std::optional<MovingStart> a, std::optional<MovingStart> b);
+
 // At a wrong scale the refinement ends in a local minimum. So this refines from other scales too
 // and returns the result with the lowest cost. `first`: the result refined from `start` itself.
 RefinedStart BestOfScales(const RefineFrom& refine, const LinearStart& start, RefinedStart first);

@@ -49,6 +49,10 @@ constexpr double kMaxTiltSigma = 0.035;     // rad
 constexpr double kMaxRmsSigmas = 1.8;
 constexpr double kMaxAccelBias = 0.8 / 0.15;  // of accel_bias_sigma
 
+// With a larger gyro bias than most phones have, the start is also refined from a bias of zero. A
+// second of a plane seen at few angles has another minimum, several degrees per second away.
+constexpr double kUsualGyroBias = 0.02;  // rad/s
+
 // Attempts without success after which the calibration is doubted. With a wrong one each attempt
 // takes long, so there are fewer of them from then on. After kSearching of them usual mistakes are
 // looked for, and again each time that so many more have failed.
@@ -356,33 +360,46 @@ std::optional<InitialResult> Initialiser::Refusal(
   return std::nullopt;
 }
 
+std::optional<MovingStart> Initialiser::StartFrom(const Vector3d& gyro_bias,
+                                                  const std::vector<StartFrame>& frames,
+                                                  const Rigid3& T_body_cam) const {
+  auto linear = SolveLinear(frames, T_body_cam, noise_, gyro_bias);
+  if (!linear) {
+    return std::nullopt;
+  }
+  const auto refine = [&frames, T_body_cam, gyro_bias, sigmas = sigmas_,
+                       noise = MeasuredNoise(noise_, samples_)](const LinearStart& start) {
+    return Refine(frames, T_body_cam, noise, gyro_bias, start, sigmas);
+  };
+  std::optional<RefinedStart> refined = RefineInFront(refine, &*linear);
+  return MovingStart{refine, *std::move(linear), std::move(refined)};
+}
+
 InitialResult Initialiser::TryMoving(const std::vector<StartFrame>& frames,
                                      const Rigid3& T_body_cam) const {
   const auto gyro_bias = SolveGyroBias(frames, T_body_cam, noise_);
   if (!gyro_bias) {
     return {std::nullopt, "too few features are tracked from image to image", true};
   }
-  auto linear = SolveLinear(frames, T_body_cam, noise_, *gyro_bias);
-  if (!linear) {
+  std::optional<MovingStart> start = StartFrom(*gyro_bias, frames, T_body_cam);
+  if (gyro_bias->norm() > kUsualGyroBias) {
+    start = BetterOf(std::move(start), StartFrom(Vector3d::Zero(), frames, T_body_cam));
+  }
+  if (!start) {
     return {std::nullopt, "the motion does not determine velocity and gravity yet"};
   }
-  const ImuNoise noise = MeasuredNoise(noise_, samples_);
-  const auto refine = [&](const LinearStart& start) {
-    return Refine(frames, T_body_cam, noise, *gyro_bias, start, sigmas_);
-  };
-  std::optional<RefinedStart> refined = RefineInFront(refine, &*linear);
-  if (auto refusal = Refusal(refined)) {
+  if (auto refusal = Refusal(start->refined)) {
     return *refusal;
   }
-  refined = BestOfScales(refine, *linear, *refined);
+  const RefinedStart refined = BestOfScales(start->refine, start->linear, *start->refined);
   if (auto refusal = Refusal(refined)) {
     return *refusal;
   }
   InitialState state;
   state.time_offset_change_s = time_offset_change_s_;
-  state.time_offset_error_s = refined->time_offset_error_s;
+  state.time_offset_error_s = refined.time_offset_error_s;
   for (size_t i = 0; i < frames_.size(); ++i) {
-    state.frames.push_back({frames_[i], refined->states[i], refined->stamp_errors_s[i]});
+    state.frames.push_back({frames_[i], refined.states[i], refined.stamp_errors_s[i]});
   }
   return {state, ""};
 }

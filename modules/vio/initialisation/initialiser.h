@@ -74,6 +74,10 @@ class Initialiser {
   InitialResult Try();
   std::optional<InitialState> TryStationary() const;
   InitialResult TryMoving();
+  // Empty if the motion does not determine velocity and gravity yet.
+  std::optional<MovingStart> StartFrom(const Eigen::Vector3d& gyro_bias,
+                                       const std::vector<StartFrame>& frames,
+                                       const Rigid3& T_body_cam) const;
   InitialResult TryMoving(const std::vector<StartFrame>& frames, const Rigid3& T_body_cam) const;
   void NoteOutcome(const InitialResult& result);
   void LookForFaults();
