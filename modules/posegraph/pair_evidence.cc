@@ -382,10 +382,10 @@ std::vector<PairEvidence::Innovation> PairEvidence::Innovations() const {
     return std::tuple(candidate.node_a, candidate.node_b, candidate.id);
   });
   std::vector<Innovation> innovations;
-  const size_t half = along.size() / 2;
+  const size_t half = along.size() / 2, apart = along.size() - half;
   for (size_t i = 0; i < half; ++i) {
     innovations.push_back(
-        Compare(candidates_[along[i]], candidates_[along[i + half]], Drift::kAsClaimed));
+        Compare(candidates_[along[i]], candidates_[along[i + apart]], Drift::kAsClaimed));
   }
   return innovations;
 }

@@ -82,9 +82,9 @@ class PairEvidence {
   bool HasSufficient() const;
 
   // Samples of the odometry's error, from the agreeing candidates: the candidates are sorted along
-  // map a, and candidate i is compared with candidate i + n/2. Each is used at most once, so that a
-  // single wrong one does not affect all samples. `measurement` and `odometry` are the two parts of
-  // the covariance of `error`.
+  // map a, and candidate i is compared with candidate i + n/2, rounded up: of three, the outer two.
+  // Each is used at most once, so that a single wrong one does not affect all samples.
+  // `measurement` and `odometry` are the two parts of the covariance of `error`.
   struct Innovation {
     Vector4d error;
     Matrix4d measurement;

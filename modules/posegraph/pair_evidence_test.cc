@@ -114,6 +114,18 @@ TEST_F(PairEvidenceTest, AnotherHypothesisHasToEarnItsMerge) {
   EXPECT_FALSE(IsAgreeing(0));
 }
 
+// Neighbours share their drift, and say nothing about it.
+TEST_F(PairEvidenceTest, OfThreeConstraintsTheOuterTwoShowTheDrift) {
+  const Pose4 drifted{kT_0_1.p + Eigen::Vector3d(0, 0.1, 0), kT_0_1.yaw};
+  Add(kT_0_1, 0, 0);
+  Add(kT_0_1, 1, 1);
+  Add(drifted, 10, 10);
+  ASSERT_EQ(evidence_.decision().agreeing.size(), 3u);
+  const auto innovations = evidence_.Innovations();
+  ASSERT_EQ(innovations.size(), 1u);
+  EXPECT_NEAR(innovations[0].error.head<3>().norm(), 0.1, 1e-9);
+}
+
 TEST_F(PairEvidenceTest, ACheckpointWithAnUnknownAgreementIsRefused) {
   Add(kT_0_1);
   Add(kT_0_1);

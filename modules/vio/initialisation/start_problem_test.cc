@@ -328,5 +328,33 @@ TEST(Refine, AStartWithANegativeScaleIsMirrored) {
               4 * mirrored->velocity_sigma);
 }
 
+MovingStart StartWithBias(const StartWorld& world, const Vector3d& gyro_bias) {
+  const auto linear = SolveLinear(world.frames, kT_body_cam, ImuNoise{}, gyro_bias);
+  const RefineFrom refine = [&world, gyro_bias](const LinearStart& from) {
+    return Refine(world.frames, kT_body_cam, ImuNoise{}, gyro_bias, from, kSigmas);
+  };
+  return {refine, linear.value(), refine(linear.value())};
+}
+
+TEST(BetterOf, AFalseGyroBiasHasTheHigherCost) {
+  const StartWorld world = Record(Lively, 0, kStartRaySigma);
+  const Vector3d false_bias = kGyroBias + Vector3d(0.06, 0, -0.04);
+  for (const bool swapped : {false, true}) {
+    const auto start = BetterOf(StartWithBias(world, swapped ? false_bias : kGyroBias),
+                                StartWithBias(world, swapped ? kGyroBias : false_bias));
+    ASSERT_TRUE(start && start->refined);
+    EXPECT_LT((start->refined->states.back().gyro_bias - kGyroBias).norm(), 2e-3) << swapped;
+  }
+}
+
+TEST(BetterOf, TakesTheOneThatThereIs) {
+  const StartWorld world = Record(Lively, 0, kStartRaySigma);
+  EXPECT_TRUE(BetterOf(std::nullopt, StartWithBias(world, kGyroBias)));
+  EXPECT_TRUE(BetterOf(StartWithBias(world, kGyroBias), std::nullopt));
+  MovingStart not_refined = StartWithBias(world, kGyroBias);
+  not_refined.refined.reset();
+  EXPECT_TRUE(BetterOf(not_refined, StartWithBias(world, kGyroBias))->refined);
+}
+
 }  // namespace
 }  // namespace pangea::vio
